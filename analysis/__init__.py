@@ -1,0 +1,1 @@
+"""The analysis: from a table of responses to tables, figures and a report."""

@@ -1,0 +1,1 @@
+"""The application: the questionnaire, the dashboard and the command line."""

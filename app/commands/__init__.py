@@ -1,0 +1,1 @@
+"""One file a verb of `subdermal`; each exposes `command`."""

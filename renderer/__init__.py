@@ -1,0 +1,1 @@
+"""The renderer: scene, passes and scattering techniques."""

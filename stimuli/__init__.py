@@ -1,0 +1,1 @@
+"""The stimuli: heads, studies, and the building of their images."""
