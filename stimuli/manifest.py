@@ -1,0 +1,164 @@
+"""The manifest: what a study shows, image by image. The only thing that the questionnaire reads.
+
+`stimuli.build` writes it; a study of ready-made images has it written by hand (`study` as in a study's
+TOML file, `images` with `framing`, `technique`, `file`, `width`, `height`, `sha256`).
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from stimuli.errors import InputError
+from stimuli.study import Study, read_study
+from stimuli.table import Table
+
+NAME = "manifest.json"
+FORMAT = "subdermal-manifest/1"
+_MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
+
+
+@dataclass(frozen=True)
+class Image:
+    """An image of the study. `renderer` and `head` are None where it was made elsewhere."""
+
+    framing: str
+    technique: str
+    file: str
+    path: Path
+    width: int
+    height: int
+    sha256: str
+    parameters: dict = field(default_factory=dict)
+    seed: int | None = None
+    renderer: dict | None = None
+    head: dict | None = None
+
+    @property
+    def media_type(self) -> str:
+        """As in an HTTP header, from the file's ending."""
+        return _MEDIA[self.path.suffix.lower()]
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """A study and its images, one for each framing and technique."""
+
+    directory: Path
+    study: Study
+    images: tuple[Image, ...]
+    licences: tuple[dict, ...]
+
+    def image(self, framing: str, technique: str) -> Image:
+        """The image of a technique at a framing; KeyError where the study has no such pair."""
+        for image in self.images:
+            if (image.framing, image.technique) == (framing, technique):
+                return image
+        raise KeyError((framing, technique))
+
+
+def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
+    """Read DIR/manifest.json and validate it; with `verify` also each file's sha256 and size in pixels."""
+    directory = Path(directory)
+    path = directory / NAME
+    try:
+        value = json.loads(path.read_bytes())
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: not there; `subdermal build STUDY.toml --out {directory}` writes it") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON: {error}") from error
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: got {type(value).__name__}, expected a table")
+
+    table = Table(value, str(path))
+    table.take("format", str, repr(FORMAT), lambda text: text == FORMAT)
+    study_table = table.table("study")
+    study = read_study(study_table)
+    study_table.end()
+    entries = table.tables("images", least=1)
+    for entry in entries:
+        entry.value = {key: value for key, value in entry.value.items() if value is not None}
+    images = tuple(_image(entry, study, directory) for entry in entries)
+    licences = table.tables("licences", least=0) if "licences" in value else []
+    for licence in licences:
+        for key in ("what", "licence", "source"):
+            licence.text(key)
+    table.end()
+    _one_each(study, images, entries, table)
+    if verify:
+        for image, entry in zip(images, entries):
+            _verify(image, entry)
+    return Manifest(directory, study, images, tuple(licence.value for licence in licences))
+
+
+def sha256(path: Path) -> str:
+    """The sha256 of a file, in hexadecimal."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _image(entry: Table, study: Study, directory: Path) -> Image:
+    def inside(text: str) -> bool:
+        parts = PurePosixPath(text)
+        return not parts.is_absolute() and ".." not in parts.parts and parts.suffix.lower() in _MEDIA
+
+    def one_of(key: str, names: list[str]) -> str:
+        return entry.take(key, str, f"one of {', '.join(names)}", lambda text: text in names)
+
+    file = entry.take("file", str, f"the path of a file inside the study's folder that ends in {', '.join(_MEDIA)}", inside)
+    image = Image(
+        framing=one_of("framing", [framing.name for framing in study.framings]),
+        technique=one_of("technique", [condition.name for condition in study.techniques]),
+        file=file,
+        path=directory / file,
+        width=entry.number("width", 1, 65535),
+        height=entry.number("height", 1, 65535),
+        sha256=entry.take("sha256", str, "64 hexadecimal digits in small letters", _is_sha256),
+        parameters=entry.take("parameters", dict, default={}),
+        seed=entry.take("seed", int, default=None),
+        renderer=entry.take("renderer", dict, default=None),
+        head=entry.take("head", dict, default=None),
+    )
+    entry.end()
+    return image
+
+
+def _is_sha256(text: str) -> bool:
+    return len(text) == 64 and set(text) <= set("0123456789abcdef")
+
+
+def _one_each(study: Study, images: tuple[Image, ...], entries: list[Table], table: Table) -> None:
+    """Each framing and technique has exactly one image, of a file of its own, in one size a framing."""
+    seen, files, sizes = {}, {}, {}
+    for image, entry in zip(images, entries):
+        pair, size = (image.framing, image.technique), (image.width, image.height)
+        if pair in seen:
+            raise InputError(f"{entry.source}: {entry.key}: a second image of {pair[1]} at {pair[0]}, after {seen[pair]}")
+        if image.file in files:
+            raise entry.fault("file", image.file, f"a file that differs from that of {files[image.file]}")
+        if sizes.setdefault(image.framing, size) != size:
+            raise entry.fault("width, height", size, f"{sizes[image.framing]}, as the other images at {image.framing}")
+        seen[pair] = files[image.file] = entry.key
+    for framing in study.framings:
+        for condition in study.techniques:
+            if (framing.name, condition.name) not in seen:
+                raise InputError(f"{table.source}: images: none of {condition.name} at {framing.name}")
+
+
+def _verify(image: Image, entry: Table) -> None:
+    import PIL.Image
+
+    if not image.path.is_file():
+        raise entry.fault("file", image.file, f"a file that is there; {image.path} is not")
+    digest = sha256(image.path)
+    if digest != image.sha256:
+        raise entry.fault("sha256", image.sha256, f"that of {image.file}, {digest}; the file was changed after the manifest")
+    try:
+        with PIL.Image.open(image.path) as picture:
+            size = picture.size
+    except (OSError, PIL.Image.DecompressionBombError) as error:
+        raise entry.fault("file", image.file, "an image that can be read") from error
+    if size != (image.width, image.height):
+        raise entry.fault("width, height", (image.width, image.height), f"{size}, the size of {image.file}")
