@@ -1,1 +1,44 @@
-"""The analysis: from a table of responses to tables, figures and a report."""
+"""From a table of answers to tables and figures. Knows nothing of the renderer, the stimuli or the web application.
+
+The public face, light to import (numpy and pandas, no matplotlib):
+
+    from analysis import read_responses, read_manifest, scores, comparisons, priorities
+    responses = read_responses("responses.csv", read_manifest("study"))     # a tidy table, see Responses
+    scores(responses)                                                       # framing, technique, score
+    for framing, comparison in comparisons(responses).items():              # AHP matrix of medians
+        if not comparison.missing:
+            print(framing, priorities(comparison.matrix))                   # vector, lambda_max, ci, cr
+
+`responses_from_records` takes mappings instead of a file. Errors of the user's making are `InputError`.
+Figures and the report live in `analysis.figures` and `analysis.report`, which load matplotlib.
+"""
+
+from .ahp import Comparison, Priorities, comparisons, medians, priorities, priorities_table, read_matrices
+from .codebook import Codebook, read_manifest
+from .errors import InputError
+from .responses import Finding, Responses, read_responses, responses_from_records
+from .tallies import distributions, familiarity, preferences, scores, sides, totals, trend
+
+__all__ = [
+    "Codebook",
+    "Comparison",
+    "Finding",
+    "InputError",
+    "Priorities",
+    "Responses",
+    "comparisons",
+    "distributions",
+    "familiarity",
+    "medians",
+    "preferences",
+    "priorities",
+    "priorities_table",
+    "read_manifest",
+    "read_matrices",
+    "read_responses",
+    "responses_from_records",
+    "scores",
+    "sides",
+    "totals",
+    "trend",
+]

@@ -1,0 +1,176 @@
+"""Analytic Hierarchy Process with one criterion: from judgements of pairs to priorities and their consistency.
+
+T. L. Saaty, "The Analytic Hierarchy Process", McGraw-Hill 1980; as used in section 5.3 of Vuletic's thesis.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from .errors import InputError
+from .responses import Responses
+
+#: Random index for matrices of 1 to 10 items; Saaty's, as in table 5.3 of the thesis. Other tools hold others (n = 3: .525, .58).
+RANDOM_INDEX = (0.0, 0.0, 0.52, 0.90, 1.12, 1.24, 1.32, 1.41, 1.45, 1.49)
+#: How far a_ik * a_ki may be from 1 in a matrix that was printed with few digits.
+RECIPROCAL_TOLERANCE = 0.02
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One framing's matrix, (n, n): matrix[i, k] says how much items[i] is preferred to items[k]; NaN where nobody compared them."""
+
+    items: tuple[str, ...]
+    matrix: np.ndarray
+
+    @property
+    def missing(self) -> list[tuple[str, str]]:
+        """The pairs that nobody compared."""
+        return [(a, b) for (i, a), (k, b) in combinations(enumerate(self.items), 2) if np.isnan(self.matrix[i, k])]
+
+
+@dataclass(frozen=True)
+class Priorities:
+    """vector (n,) sums to 1; ci = (lambda_max - n)/(n - 1); cr = ci / RI, None beyond 10 items, where there is no RI."""
+
+    vector: np.ndarray
+    lambda_max: float
+    ci: float
+    cr: float | None
+
+    @property
+    def verdict(self) -> str:
+        if self.cr is None:
+            return "no consistency ratio: there is no random index beyond 10 items"
+        if self.cr >= 0.1:
+            return "incoherent: from 0.1 on, the method of asking should change"
+        return "coherent" if self.cr < 0.01 else "acceptably coherent (below 0.1)"
+
+
+def judgements(preference: np.ndarray) -> np.ndarray:
+    """Preferences, -2 (strong for a) to 2 (strong for b), as judgements of a over b: 3, 2, 1, 1/2, 1/3."""
+    preference = np.asarray(preference)
+    scale = 1.0 + np.abs(preference)
+    return np.where(preference > 0, 1 / scale, scale)
+
+
+def medians(responses: Responses) -> pd.DataFrame:
+    """framing, a, b, n, median_preference (-2 to 2, negative prefers a), median_judgement (of a over b), one row a pair.
+
+    a comes before b in the order of techniques: this is the triangle above the diagonal.
+    """
+    frame = responses.frame
+    frame = frame[["framing", "a", "b", "preference"]].assign(judgement=judgements(frame.preference))
+    table = frame.groupby(["framing", "a", "b"], observed=True).agg(
+        n=("preference", "size"), median_preference=("preference", "median"), median_judgement=("judgement", "median")
+    )
+    return table.reset_index().astype(dict.fromkeys(("framing", "a", "b"), object))
+
+
+def comparisons(responses: Responses) -> dict[str, Comparison]:
+    """Framing -> matrix of medians, taken above the diagonal in the order of techniques and inverted below.
+
+    The order matters: the median of 1 and 2 is 1.5, and 0.75 the other way, which is not 1/1.5.
+    """
+    table = medians(responses)
+    result = {}
+    for framing, items in responses.items.items():
+        matrix = np.full((len(items), len(items)), np.nan)
+        np.fill_diagonal(matrix, 1.0)
+        for row in table[table.framing == framing].itertuples():
+            i, k = items.index(row.a), items.index(row.b)
+            matrix[i, k], matrix[k, i] = row.median_judgement, 1 / row.median_judgement
+        result[framing] = Comparison(items, matrix)
+    return result
+
+
+def priorities(matrix: np.ndarray) -> Priorities:
+    """The principal eigenvector of a positive matrix (n, n), scaled to sum 1, and its consistency."""
+    matrix = np.asarray(matrix, float)
+    n = len(matrix)
+    if matrix.shape != (n, n) or n == 0 or not (np.isfinite(matrix) & (matrix > 0)).all():
+        raise InputError(f"a matrix of shape {matrix.shape} has no priorities; expected it square, complete and positive")
+    values, vectors = np.linalg.eig(matrix)
+    principal = np.argmax(values.real)
+    vector = np.abs(vectors[:, principal].real)
+    lambda_max = float(values[principal].real)
+    ci = (lambda_max - n) / (n - 1) if n > 2 else 0.0
+    if n > len(RANDOM_INDEX):
+        cr = None
+    else:
+        cr = ci / RANDOM_INDEX[n - 1] if n > 2 else 0.0
+    return Priorities(vector / vector.sum(), lambda_max, ci, cr)
+
+
+def priorities_table(comparisons: Mapping[str, Comparison]) -> pd.DataFrame:
+    """framing, technique, priority, lambda_max, ci, cr; empty numbers where a framing's pairs are incomplete."""
+    rows = []
+    for framing, comparison in comparisons.items():
+        if comparison.missing:
+            rows += [(framing, name, np.nan, np.nan, np.nan, np.nan) for name in comparison.items]
+            continue
+        found = priorities(comparison.matrix)
+        cr = np.nan if found.cr is None else found.cr
+        rows += [
+            (framing, name, priority, found.lambda_max, found.ci, cr)
+            for name, priority in zip(comparison.items, found.vector, strict=True)
+        ]
+    return pd.DataFrame(rows, columns=["framing", "technique", "priority", "lambda_max", "ci", "cr"])
+
+
+def read_matrices(path: str | Path) -> dict[str, Comparison]:
+    """Framing -> matrix, from a TOML file: `items = [names]`, then for each framing `[matrix.NAME]` with `rows = [[...], ...]`."""
+    path = Path(path)
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: not TOML in UTF-8: {' '.join(str(error).split())}") from None
+    items = table.get("items")
+    if (
+        not isinstance(items, list)
+        or not items
+        or not all(isinstance(name, str) and name for name in items)
+        or len(set(items)) < len(items)
+    ):
+        raise InputError(f"{path}: items is {items!r:.60}, expected a list of different names")
+    matrices = table.get("matrix")
+    if not isinstance(matrices, dict) or not matrices:
+        raise InputError(f"{path}: matrix is {matrices!r:.60}, expected a table [matrix.NAME] for each framing")
+    return {
+        framing: Comparison(tuple(items), _matrix(f"{path}: matrix.{framing}", entry, items))
+        for framing, entry in matrices.items()
+    }
+
+
+def _matrix(name: str, entry: object, items: Sequence[str]) -> np.ndarray:
+    """The rows of one matrix, checked: square, numbers, positive, reciprocal."""
+    rows = entry.get("rows") if isinstance(entry, dict) else None
+    if not isinstance(rows, list) or len(rows) != len(items):
+        got = f"{len(rows)} rows" if isinstance(rows, list) else f"{rows!r:.60}"
+        raise InputError(f"{name}.rows is {got}, expected {len(items)} rows, one for each of the items")
+    for i, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) != len(items):
+            got = f"{len(row)} numbers" if isinstance(row, list) else f"{row!r:.60}"
+            raise InputError(f"{name}.rows[{i}] has {got}, expected {len(items)}")
+        for k, value in enumerate(row):
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not 0 < value < float("inf"):
+                raise InputError(f"{name}.rows[{i}][{k}] is {value!r:.60}, expected a positive number")
+    matrix = np.array(rows, float)
+    off = np.abs(matrix * matrix.T - 1)
+    if off.max() > RECIPROCAL_TOLERANCE:
+        i, k = np.unravel_index(np.argmax(off), off.shape)
+        raise InputError(
+            f"{name} is not reciprocal: {items[i]} over {items[k]} is {matrix[i, k]:g} and the other way {matrix[k, i]:g}, "
+            f"their product is {matrix[i, k] * matrix[k, i]:g}, expected 1 within {RECIPROCAL_TOLERANCE}"
+        )
+    return matrix

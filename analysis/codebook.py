@@ -1,0 +1,123 @@
+"""What the names in a response table mean: which framings and techniques there are, in which order, with which labels.
+
+A codebook comes from a study's `manifest.json`, or, without one, from the table itself.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from .errors import InputError
+
+MANIFEST_FORMAT = "subdermal-manifest/1"
+#: From near to far. A randomised questionnaire shows them in any order, so that first appearance says nothing.
+KNOWN_FRAMINGS = ("close-up", "head-shot", "half-length")
+#: Levels 1 to 5 of the self-rating, and answers -2 to 2, where the study names none (study.md, 'The questionnaire').
+FAMILIARITY = ("1, no familiarity", "2", "3", "4", "5, high familiarity")
+
+
+@dataclass(frozen=True)
+class Codebook:
+    """Order and labels of a study's framings and techniques; `order_rule` and `framing_rule` say where the orders come from."""
+
+    framings: tuple[str, ...]
+    techniques: tuple[str, ...]
+    order_rule: str
+    framing_rule: str
+    labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    familiarity: tuple[str, ...] = FAMILIARITY
+    title: str = ""
+
+    def framing_label(self, name: str) -> str:
+        return self.labels.get(("framing", name), name)
+
+    def label(self, technique: str) -> str:
+        return self.labels.get(("technique", technique), technique)
+
+    def ordered(self, order: Iterable[str], needed: Iterable[str]) -> Codebook:
+        """The same codebook with the techniques in `order`, which must name each of `needed` once and nothing unknown."""
+        order, needed = tuple(order), list(needed)
+        twice = [name for name in dict.fromkeys(order) if order.count(name) > 1]
+        missing = [name for name in needed if name not in order]
+        unknown = [name for name in order if name not in self.techniques]
+        for fault, names in (("names twice", twice), ("lacks", missing), ("names the unknown", unknown)):
+            if names:
+                raise InputError(
+                    f"the order {','.join(order)!r} {fault} {', '.join(map(repr, names))}; "
+                    f"expected each once: {','.join(needed)}"
+                )
+        return replace(self, techniques=order, order_rule="as given on the command line")
+
+
+def from_table(framings: Iterable[str], techniques: Iterable[str]) -> Codebook:
+    """The codebook of a table without a manifest; names come in order of first appearance and are their own labels."""
+    seen = tuple(dict.fromkeys(framings))
+    known = tuple(name for name in KNOWN_FRAMINGS if name in seen)
+    rule = "from near to far, by their known names" if known else "first appearance in the table"
+    if known and len(known) < len(seen):
+        rule += ", then first appearance in the table"
+    return Codebook(
+        framings=known + tuple(name for name in seen if name not in known),
+        techniques=tuple(dict.fromkeys(techniques)),
+        order_rule="first appearance in the table",
+        framing_rule=rule,
+    )
+
+
+def is_manifest(path: Path) -> bool:
+    """Whether the file is a subdermal manifest of any version, whole or not; other tools write a `manifest.json` too."""
+    return b'"subdermal-manifest/' in path.read_bytes()
+
+
+def read_manifest(path: str | Path) -> Codebook:
+    """The codebook of a study, from its `manifest.json` (or the folder that holds it). Images are not looked at."""
+    path = Path(path)
+    if path.is_dir():
+        path = path / "manifest.json"
+    try:
+        manifest = json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json") from None
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON: {' '.join(str(error).split())}") from None
+    if not isinstance(manifest, dict) or manifest.get("format") != MANIFEST_FORMAT:
+        got = manifest.get("format") if isinstance(manifest, dict) else type(manifest).__name__
+        raise InputError(f"{path}: format is {got!r}, expected {MANIFEST_FORMAT!r}")
+    study = manifest.get("study")
+    if not isinstance(study, dict):
+        raise InputError(f"{path}: study is {study!r:.60}, expected a table with framings and techniques")
+    framings, techniques = (_named(path, study, key) for key in ("framings", "techniques"))
+    rating = study.get("familiarity")
+    levels = rating.get("labels") if isinstance(rating, dict) else None
+    if levels is not None and not (
+        isinstance(levels, list) and len(levels) == 5 and all(isinstance(text, str) for text in levels)
+    ):
+        raise InputError(f"{path}: study.familiarity.labels is {levels!r:.60}, expected five texts")
+    return Codebook(
+        framings=tuple(framings),
+        techniques=tuple(techniques),
+        order_rule=f"the study's ({path.name})",
+        framing_rule=f"the study's ({path.name})",
+        labels={("framing", name): label for name, label in framings.items()}
+        | {("technique", name): label for name, label in techniques.items()},
+        familiarity=FAMILIARITY if levels is None else tuple(levels),
+        title=str(study.get("title") or study.get("name") or ""),
+    )
+
+
+def _named(path: Path, study: dict, key: str) -> dict[str, str]:
+    """Name -> label of study.framings or study.techniques, checked."""
+    entries = study.get(key)
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{path}: study.{key} is {entries!r:.60}, expected a list of tables with a name")
+    labels: dict[str, str] = {}
+    for place, entry in enumerate(entries):
+        name = entry.get("name") if isinstance(entry, dict) else None
+        if not isinstance(name, str) or not name or name in labels:
+            raise InputError(f"{path}: study.{key}[{place}].name is {name!r:.60}, expected a name of its own")
+        label = entry.get("label")
+        labels[name] = label if isinstance(label, str) and label else name
+    return labels

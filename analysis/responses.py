@@ -1,0 +1,348 @@
+"""Reads a table of answers, one row a trial, and makes it tidy. Nothing is dropped in silence.
+
+A row that cannot be used becomes a `Finding` with its line number and its reason; a fault of the whole file is an InputError.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from . import codebook as codebooks
+from .codebook import Codebook
+from .errors import InputError
+
+REQUIRED = ("participant", "familiarity", "framing", "left", "right", "answer", "order", "rt_ms", "started_at")
+OPTIONAL = ("simulated", "study", "study_version")
+
+_INTEGER = r"[+-]?[0-9]{1,9}(?:\.0*)?"
+_NUMBER = r"\+?[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,2})?"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A row that is not counted. `kind` is 'malformed' or 'duplicate'; `last_line` differs where a row spans several lines."""
+
+    line: int
+    last_line: int
+    kind: str
+    reason: str
+    row: str
+
+    def __str__(self) -> str:
+        lines = f"line {self.line}" if self.line == self.last_line else f"lines {self.line} to {self.last_line}"
+        return f"{lines}: {self.reason}"
+
+
+@dataclass(frozen=True)
+class Responses:
+    """A tidy table of answers and what is known about it.
+
+    frame has one row an answer:
+        participant     category
+        familiarity     int8, 1 to 5
+        framing         ordered category, in the order of the codebook
+        a, b            ordered categories: the pair, a before b in the order of techniques
+        preference      int8, -2 to 2, oriented to the pair: negative prefers a, positive prefers b
+        strength        int8, 0 to 2: |preference|
+        winner          ordered category: the preferred technique, missing where strength is 0
+        a_left          bool: a was shown on the left
+        answer          int8, -2 to 2, as given: negative prefers the left image
+        order           int32, 1 is the first question
+        rt_ms           float64, milliseconds
+        started_at      datetime, UTC
+        line            int64, where the row begins in the file
+    """
+
+    frame: pd.DataFrame
+    codebook: Codebook
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+    simulated: bool = False
+    rows: int = 0
+    source: str = ""
+    sha256: str = ""
+
+    @cached_property
+    def items(self) -> dict[str, tuple[str, ...]]:
+        """Framing -> the techniques that have answers there, both in the order of the codebook."""
+        items = {}
+        for framing in self.codebook.framings:
+            here = self.frame[self.frame.framing == framing]
+            seen = set(here.a) | set(here.b)
+            if seen:
+                items[framing] = tuple(name for name in self.codebook.techniques if name in seen)
+        return items
+
+    @property
+    def participants(self) -> int:
+        return self.frame.participant.nunique()
+
+
+def read_responses(
+    path: str | Path, codebook: Codebook | None = None, order: Iterable[str] | None = None
+) -> Responses:
+    """Read responses.csv (UTF-8 with or without BOM, comma separated). See `Responses` for what comes out.
+
+    codebook: the study's (`codebook.read_manifest`); without it names, labels and order come from the table.
+    order: every technique once; overrides the order of the codebook.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    raw, lines, findings = _parse(str(path), data)
+    return _tidy(str(path), raw, lines, findings, codebook, order, hashlib.sha256(data).hexdigest())
+
+
+def responses_from_records(
+    records: Iterable[Mapping[str, object]], codebook: Codebook | None = None, order: Iterable[str] | None = None
+) -> Responses:
+    """The same from mappings with the columns of responses.csv, for answers that are not in a file; lines count from 1."""
+    raw = pd.DataFrame.from_records(list(records))
+    missing = [name for name in REQUIRED if name not in raw]
+    if missing:
+        raise InputError(f"the records lack {', '.join(missing)}; expected {', '.join(REQUIRED)}")
+    raw = raw[[name for name in (*REQUIRED, *OPTIONAL) if name in raw]]
+    raw = raw.map(lambda value: str(int(value)) if isinstance(value, bool) else str(value)).astype(object)
+    raw["line"] = raw["last_line"] = np.arange(1, len(raw) + 1)
+    lines = [",".join(values) for values in raw[list(REQUIRED)].to_numpy()]
+    return _tidy("the records", raw, lines, [], codebook, order, "")
+
+
+def _parse(name: str, data: bytes) -> tuple[pd.DataFrame, list[str], list[Finding]]:
+    """The cells as text, with line and last_line; the lines of the file; findings for the rows that have not the header's fields."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{name}: line {line}: byte 0x{data[error.start]:02x} is not UTF-8; save the table as 'CSV UTF-8'"
+        ) from None
+    if not text.strip():
+        raise InputError(f"{name}: is empty, expected a header and one row an answer")
+    lines = list(io.StringIO(text, newline=""))
+    reader = csv.reader(iter(lines), strict=True)
+    try:
+        header = [cell.strip() for cell in next(reader)]
+    except csv.Error as error:
+        raise InputError(f"{name}: line 1: the header is no CSV: {error}") from None
+    missing = [column for column in REQUIRED if column not in header]
+    if missing:
+        hint = next((f"; is it separated by {mark!r}?" for mark in ";\t" if mark in lines[0]), "")
+        raise InputError(f"{name}: has no column {', '.join(missing)}{hint}; expected {','.join(REQUIRED)}")
+    wanted = [column for column in (*REQUIRED, *OPTIONAL) if column in header]
+    twice = [column for column in wanted if header.count(column) > 1]
+    if twice:
+        raise InputError(f"{name}: has the column {', '.join(twice)} twice")
+
+    places = [header.index(column) for column in wanted]
+    cells: list[tuple[str, ...]] = []
+    spans: list[tuple[int, int]] = []
+    findings: list[Finding] = []
+    while True:
+        first = reader.line_num + 1
+        try:
+            row = next(reader)
+            fault = f"has {len(row)} fields, expected {len(header)} as in the header"
+        except StopIteration:
+            break
+        except csv.Error as error:
+            row, fault = None, f"is no CSV: {error}"
+            if reader.line_num >= len(lines) and "unexpected end" in str(error):
+                raise InputError(f"{name}: line {first}: a quotation mark is opened and never closed") from None
+        if row == []:
+            continue
+        if row is not None and len(row) == len(header):
+            cells.append(tuple(row[place].strip() for place in places))
+            spans.append((first, reader.line_num))
+        else:
+            findings.append(_finding(first, reader.line_num, "malformed", fault, lines))
+    if not cells and not findings:
+        raise InputError(f"{name}: has a header and no rows, expected one row an answer")
+    raw = pd.DataFrame(cells, columns=wanted, dtype=object)
+    raw["line"], raw["last_line"] = np.array(spans, dtype=np.int64).reshape(-1, 2).T
+    return raw, lines, findings
+
+
+def _finding(first: int, last: int, kind: str, reason: str, lines: list[str]) -> Finding:
+    return Finding(int(first), int(last), kind, reason, "".join(lines[first - 1 : last]).rstrip("\r\n"))
+
+
+def _tidy(
+    name: str,
+    raw: pd.DataFrame,
+    lines: list[str],
+    findings: list[Finding],
+    codebook: Codebook | None,
+    order: Iterable[str] | None,
+    sha256: str,
+) -> Responses:
+    rows = len(raw) + len(findings)
+    values, reasons = _checked(raw, codebook)
+    simulated = _one_kind(name, raw)
+    findings = findings + [
+        _finding(raw.line[at], raw.last_line[at], "malformed", "; ".join(reasons[at]), lines) for at in sorted(reasons)
+    ]
+    frame = raw[["participant", "framing", "left", "right", "line", "last_line"]].join(values).drop(index=list(reasons))
+    if frame.empty:
+        first = min(findings, key=lambda finding: finding.line)
+        raise InputError(f"{name}: none of its {rows} rows can be used; {first}")
+
+    if codebook is None:
+        codebook = codebooks.from_table(frame.framing, frame[["left", "right"]].to_numpy().ravel())
+    if order is not None:
+        present = set(frame.left) | set(frame.right)
+        codebook = codebook.ordered(order, [name for name in codebook.techniques if name in present])
+
+    frame = _oriented(frame, codebook)
+    key = ["participant", "framing", "a", "b"]
+    again = frame.duplicated(key)
+    if again.any():
+        firsts = frame.drop_duplicates(key)[[*key, "line"]].rename(columns={"line": "first"})
+        repeats = frame[again].merge(firsts, on=key)
+        findings += [
+            _finding(
+                row.line,
+                row.last_line,
+                "duplicate",
+                f"{row.participant!r} answered {row.framing}, {row.a} against {row.b}, on line {row.first} already, "
+                "which is the one that counts",
+                lines,
+            )
+            for row in repeats.itertuples()
+        ]
+        frame = frame[~again]
+    frame = frame.drop(columns="last_line").reset_index(drop=True)
+    return Responses(
+        frame=frame,
+        codebook=codebook,
+        findings=tuple(sorted(findings, key=lambda finding: finding.line)),
+        notes=tuple(_notes(frame, raw, codebook)),
+        simulated=simulated,
+        rows=rows,
+        source=Path(name).name,
+        sha256=sha256,
+    )
+
+
+def _checked(raw: pd.DataFrame, codebook: Codebook | None) -> tuple[pd.DataFrame, dict[int, list[str]]]:
+    """The numeric columns as numbers, and for each row that fails, by its position, why."""
+    values = pd.DataFrame(index=raw.index)
+    for column, pattern in (("familiarity", _INTEGER), ("answer", _INTEGER), ("order", _INTEGER), ("rt_ms", _NUMBER)):
+        values[column] = pd.to_numeric(raw[column].where(raw[column].str.fullmatch(pattern)), errors="coerce")
+    values["started_at"] = pd.to_datetime(raw.started_at, format="ISO8601", utc=True, errors="coerce")
+
+    checks = [(column, raw[column] == "", "a name") for column in ("participant", "framing", "left", "right")]
+    checks += [
+        ("familiarity", ~values.familiarity.between(1, 5), "an integer from 1 to 5"),
+        ("answer", ~values.answer.between(-2, 2), "an integer from -2 to 2"),
+        ("order", ~(values.order >= 1), "an integer from 1"),
+        ("rt_ms", ~np.isfinite(values.rt_ms), "milliseconds, a number from 0"),
+        ("started_at", values.started_at.isna(), "a time in ISO 8601"),
+    ]
+    if "simulated" in raw:
+        checks.append(("simulated", ~raw.simulated.isin(["0", "1"]), "0 or 1"))
+    if codebook is not None:
+        for column, names in (
+            ("framing", codebook.framings),
+            ("left", codebook.techniques),
+            ("right", codebook.techniques),
+        ):
+            expected = f"one of the study's: {', '.join(names)}"
+            checks.append((column, ~raw[column].isin(names) & (raw[column] != ""), expected))
+
+    reasons: dict[int, list[str]] = {}
+    for column, bad, expected in checks:
+        for at in np.flatnonzero(bad):
+            reasons.setdefault(at, []).append(f"{column} is {raw[column][at]!r:.60}, expected {expected}")
+    for at in np.flatnonzero((raw.left == raw.right) & (raw.left != "")):
+        reasons.setdefault(at, []).append(f"left and right are both {raw.left[at]!r:.60}, expected two techniques")
+    return values, reasons
+
+
+def _one_kind(name: str, raw: pd.DataFrame) -> bool:
+    """Whether the answers are simulated; refuses a table that mixes them with real ones."""
+    if "simulated" not in raw:
+        return False
+    first = {flag: raw.line[raw.simulated == flag].min() for flag in ("0", "1") if (raw.simulated == flag).any()}
+    if len(first) == 2:
+        raise InputError(
+            f"{name}: mixes real answers (first on line {first['0']}) and simulated ones (first on line {first['1']}); "
+            "expected one kind"
+        )
+    return "1" in first
+
+
+def _oriented(frame: pd.DataFrame, codebook: Codebook) -> pd.DataFrame:
+    """Adds pair, preference, strength and winner; see `Responses`."""
+    techniques = pd.CategoricalDtype(codebook.techniques, ordered=True)
+    left, right = (pd.Categorical(frame[side], dtype=techniques).codes for side in ("left", "right"))
+    a_left = left < right
+    preference = np.where(a_left, frame.answer, -frame.answer).astype(np.int8)
+    a, b = np.minimum(left, right), np.maximum(left, right)
+    winner = np.where(preference < 0, a, np.where(preference > 0, b, -1))
+    return pd.DataFrame(
+        {
+            "participant": frame.participant.astype("category"),
+            "familiarity": frame.familiarity.astype(np.int8),
+            "framing": pd.Categorical(frame.framing, codebook.framings, ordered=True),
+            "a": pd.Categorical.from_codes(a, dtype=techniques),
+            "b": pd.Categorical.from_codes(b, dtype=techniques),
+            "preference": preference,
+            "strength": np.abs(preference),
+            "winner": pd.Categorical.from_codes(winner, dtype=techniques),
+            "a_left": a_left,
+            "answer": frame.answer.astype(np.int8),
+            "order": frame.order.astype(np.int32),
+            "rt_ms": frame.rt_ms.astype(float),
+            "started_at": frame.started_at,
+            "line": frame.line,
+            "last_line": frame.last_line,
+        },
+        index=frame.index,
+    )
+
+
+def _notes(frame: pd.DataFrame, raw: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
+    """What a reader should know of rows that are counted all the same."""
+    levels = frame.groupby("participant", observed=True).familiarity.nunique()
+    unsure = list(levels.index[levels > 1])
+    if unsure:
+        yield f"{_some(unsure)} rated their familiarity in more than one way; the first rating is used."
+    questions = len(frame[["framing", "a", "b"]].drop_duplicates())
+    answers = frame.participant.value_counts()
+    short = sorted(answers.index[answers < questions])
+    if short:
+        yield f"{_some(short)} answered fewer than the {questions} questions in the table; what they answered is counted."
+    for column in ("study", "study_version"):
+        if column in raw:
+            several = sorted(raw[column].unique())
+            if len(several) > 1:
+                yield f"The table pools answers with {len(several)} values of {column}: {_some(several)}."
+    present = set(frame.a) | set(frame.b)
+    for framing in codebook.framings:
+        here = frame[frame.framing == framing]
+        absent = [name for name in codebook.techniques if name in present and name not in set(here.a) | set(here.b)]
+        if here.empty:
+            yield f"No answers at {framing}."
+        elif absent:
+            yield f"No answers at {framing} for {_some(absent)}."
+    absent = [name for name in codebook.techniques if name not in present]
+    if absent:
+        yield f"No answers at all for {_some(absent)}."
+
+
+def _some(names: list[str], most: int = 6) -> str:
+    """The names in one phrase, cut after `most`."""
+    shown = ", ".join(map(str, names[:most]))
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
