@@ -1,0 +1,32 @@
+"""`subdermal build`: from a study to its images and their manifest."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("study", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the images and manifest.json; made when it is not there.",
+)
+@click.option("--head", help='Head to show instead of the one that STUDY names: "default", or a scan, FILE.glb or FILE.obj.')
+@click.option("--unit", help="Unit of the scan's coordinates, such as m, cm or mm; guessed, and said, when not given.")
+@click.option("--force", is_flag=True, help="Render every image anew, also those that are up to date.")
+def command(study: Path, out: Path, head: str | None, unit: str | None, force: bool) -> None:
+    """Render the images of the study defined in STUDY, a TOML file, and write their manifest.
+
+    Only what changed since the last build is rendered, and an interrupted build goes on where it stopped.
+    """
+    from stimuli.build import build
+    from stimuli.study import HeadChoice, load_study
+
+    definition = load_study(study)
+    if head or unit:
+        definition = replace(definition, head=HeadChoice(head or definition.head.name, unit or definition.head.unit))
+    built = build(definition, out, force=force, progress=True)
+    click.echo(f"{out}: {built.rendered + built.kept} images, {built.rendered} rendered, {built.kept} up to date")
