@@ -1,1 +1,48 @@
-"""The application: the questionnaire, the dashboard and the command line."""
+"""The application: the questionnaire and the dashboard over one study folder.
+
+`create_app` and nothing else: everything it puts together has a module of its own.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flask import Flask
+
+__all__ = ["create_app"]
+
+
+def create_app(
+    study_dir: str | Path,
+    database_url: str | None = None,
+    *,
+    simulated: bool = False,
+) -> Flask:
+    """Make the WSGI application of the study in `study_dir` (a folder with a manifest.json).
+
+    database_url: an SQLAlchemy URL; by default study.sqlite3 (or simulated.sqlite3) in the folder.
+    simulated: whether the database holds simulated answers. It is recorded in the database at its
+        creation, and a database of the other kind is refused.
+    """
+    from app import dashboard, questionnaire, security, web
+    from app.database import Database
+    from app.simulation import views as simulation
+    from app.study import Study
+
+    study = Study.open(study_dir)
+    database = Database.open(database_url or study.database_url(simulated), study, simulated=simulated)
+
+    app = Flask(
+        "app",
+        static_folder=str(Path(__file__).parent / "static"),
+        template_folder=str(Path(__file__).parent.parent / "templates"),
+    )
+    app.extensions["study"] = study
+    app.extensions["database"] = database
+    security.init(app)
+    web.init(app)
+    app.register_blueprint(questionnaire.blueprint)
+    app.register_blueprint(dashboard.blueprint)
+    if simulated:
+        app.register_blueprint(simulation.blueprint)
+    return app

@@ -1,0 +1,55 @@
+"""`subdermal serve`: the questionnaire and the dashboard of a study folder."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 for every network of this machine.")
+@click.option("--port", default=8000, show_default=True, type=click.IntRange(0, 65535), help="Port to listen on; 0 takes a free one.")
+@click.option("--database", metavar="URL", help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.")
+@click.option("--reset-password", is_flag=True, help="Set a new dashboard password, show it once, and end every login.")
+@click.option(
+    "--trusted-proxy", metavar="ADDRESS", help="Address of a reverse proxy that ends https; its X-Forwarded-Proto, -Host and -For are believed."
+)
+def command(directory: Path, host: str, port: int, database: str | None, reset_password: bool, trusted_proxy: str | None) -> None:
+    """Serve the questionnaire and the dashboard of the study in DIR (a folder with a manifest.json).
+
+    The dashboard's password is made at the first start and shown once. Simulated participants of the same
+    study, if there are any, are under /simulated/.
+    """
+    from werkzeug.middleware.dispatcher import DispatcherMiddleware
+
+    from app import create_app
+    from app.dashboard import password
+    from app.server import bind
+
+    app = create_app(directory, database)
+    study, answers = app.extensions["study"], app.extensions["database"]
+    application, simulated = app, (study.directory / "simulated.sqlite3").is_file()
+    if simulated:
+        twin = create_app(directory, simulated=True)
+        application = DispatcherMiddleware(app, {"/simulated": twin})
+    proxy = {}
+    if trusted_proxy:
+        proxy = {"trusted_proxy": trusted_proxy, "trusted_proxy_headers": {"x-forwarded-for", "x-forwarded-proto", "x-forwarded-host"}}
+    server = bind(application, host, port, **proxy)
+    shown = password.reset(answers) if reset_password or answers.record().password_hash is None else None
+    if simulated:
+        twin.config["PASSWORD_HASH"] = answers.record().password_hash  # one password opens both dashboards
+
+    address = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{server.effective_port}"
+    click.echo(f"questionnaire  {address}/")
+    click.echo(f"dashboard      {address}/dashboard/")
+    if shown:
+        click.echo(f"password       {shown}   (shown only now)")
+    if study.report(False).is_file():
+        click.echo(f"report         {address}/dashboard/report/")
+    if simulated:
+        click.echo(f"simulated      {address}/simulated/dashboard/")
+        if study.report(True).is_file():
+            click.echo(f"               {address}/simulated/dashboard/report/")
+    click.echo("Ctrl+C ends the server; every answer that was acknowledged is saved.")
+    server.run()

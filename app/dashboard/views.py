@@ -1,0 +1,111 @@
+"""The pages and downloads of the dashboard. Everything but the login needs the password."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+
+from flask import Blueprint, Response, abort, flash, jsonify, redirect, render_template, request, send_from_directory, url_for
+
+from app import export
+from app.dashboard import live, password
+from app.security import REPORT_POLICY, Limiter
+from app.web import database, simulated, study, wants_json
+
+blueprint = Blueprint("dashboard", __name__, url_prefix="/dashboard")
+_logins = Limiter(attempts=5, window_s=300)
+
+
+@blueprint.before_request
+def _require_login():
+    if request.endpoint == "dashboard.login" or password.logged_in():
+        return None
+    if wants_json():
+        abort(401, "The login has ended. Log in again.")
+    return redirect(url_for(".login"), 303)
+
+
+@blueprint.route("/login", methods=["GET", "POST"])
+def login():
+    if request.method == "GET":
+        return redirect(url_for(".index"), 303) if password.logged_in() else render_template("dashboard/login.html")
+    if not _logins.allow(request.remote_addr):
+        abort(429, "Too many passwords were tried. Wait five minutes and try again.")
+    if not password.log_in(request.form.get("password", "")):
+        flash("This is not the password. It was shown when the server first started; `subdermal serve --reset-password` sets a new one.")
+        return render_template("dashboard/login.html"), 401
+    _logins.forget(request.remote_addr)
+    return redirect(url_for(".index"), 303)
+
+
+@blueprint.post("/logout")
+def logout():
+    password.log_out()
+    return redirect(url_for(".login"), 303)
+
+
+@blueprint.get("/")
+def index():
+    return render_template(
+        "dashboard/index.html",
+        images=study().manifest.images,
+        framing_labels={framing.name: framing.label for framing in study().asked.framings},
+        technique_labels={condition.name: condition.label for condition in study().asked.techniques},
+        has_report=study().report(simulated()).is_file(),
+        **_numbers(),
+    )
+
+
+@blueprint.get("/live.json")
+def live_json():
+    """What changes, as numbers and as the piece of the page that shows them."""
+    numbers = _numbers()
+    return jsonify(**numbers, html=render_template("dashboard/live.html", **numbers))
+
+
+@blueprint.get("/responses.csv")
+def responses_csv():
+    """The table, streamed; X-Row-Count says how many answers it must hold."""
+    with ExitStack() as opened:
+        db = opened.enter_context(database().read())  # one snapshot for the count and the rows
+        rows = export.count(db)
+        body = export.responses_csv(db, study(), simulated=simulated())
+        response = _download(body, "simulated_responses.csv" if simulated() else "responses.csv")
+        response.headers["X-Row-Count"] = str(rows)
+        response.call_on_close(opened.pop_all().close)
+    return response
+
+
+@blueprint.get("/codebook.csv")
+def codebook_csv():
+    return _download(export.codebook_csv(), "codebook.csv")
+
+
+@blueprint.get("/codebook.md")
+def codebook_md():
+    response = _download(export.codebook_md(study(), simulated=simulated()), "codebook.md")
+    response.mimetype = "text/markdown"
+    return response
+
+
+@blueprint.get("/report/")
+@blueprint.get("/report/<path:name>")
+def report(name: str = "report.html"):
+    """The report of `subdermal analyse` and what it links to, with a policy of its own: inline styles, no scripts."""
+    found = study().report(simulated())
+    if not found.is_file():
+        abort(404, f"There is no report yet. Download responses.csv, then: subdermal analyse responses.csv --out {found.parent.name}")
+    response = send_from_directory(found.parent, name)
+    response.headers["Content-Security-Policy"] = REPORT_POLICY
+    response.headers["Cache-Control"] = "no-store"
+    return response
+
+
+def _numbers() -> dict:
+    with database().read() as db:
+        return live.numbers(db, study(), simulated=simulated())
+
+
+def _download(body, name: str) -> Response:
+    response = Response(body, mimetype="text/csv")
+    response.headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return response

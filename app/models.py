@@ -1,0 +1,147 @@
+"""The tables. Answers and events are only ever appended; nothing here drops or overwrites them."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from sqlalchemy import BigInteger, CheckConstraint, DateTime, ForeignKey, Index, MetaData, String, UniqueConstraint
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+from sqlalchemy.types import TypeDecorator
+
+
+def now() -> datetime:
+    """The time of day, UTC and aware of it."""
+    return datetime.now(UTC)
+
+
+class UtcDateTime(TypeDecorator):
+    """An aware UTC time in every database (SQLite keeps no time zone of its own)."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value, dialect):
+        return None if value is None else value.astimezone(UTC)
+
+    def process_result_value(self, value, dialect):
+        if value is None:
+            return None
+        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+class Base(DeclarativeBase):
+    metadata = MetaData(
+        naming_convention={
+            "pk": "pk_%(table_name)s",
+            "fk": "fk_%(table_name)s_%(column_0_name)s",
+            "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+            "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+            "ck": "ck_%(table_name)s_%(constraint_name)s",
+        }
+    )
+    type_annotation_map = {datetime: UtcDateTime}
+
+
+class StudyRecord(Base):
+    """What this database is about. One row, written when the database is made."""
+
+    __tablename__ = "study"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str] = mapped_column(String(9))
+    name: Mapped[str] = mapped_column(String(200))
+    version: Mapped[int]
+    seed: Mapped[int] = mapped_column(BigInteger)
+    design: Mapped[str]  # JSON: the names of framings and techniques, in the order of the study
+    secret_key: Mapped[str] = mapped_column(String(64))  # signs the cookies
+    password_hash: Mapped[str | None] = mapped_column(String(255))  # scrypt; None: nobody can log in yet
+    simulation_seed: Mapped[int | None] = mapped_column(BigInteger)
+    created_at: Mapped[datetime] = mapped_column(default=now)
+
+    __table_args__ = (CheckConstraint("kind IN ('real', 'simulated')", name="kind"), CheckConstraint("id = 1", name="one_row"))
+
+
+class Participant(Base):
+    """A person who gave consent; `id` is the number that the design is drawn from."""
+
+    __tablename__ = "participants"
+    __table_args__ = {"sqlite_autoincrement": True}  # a number is never given twice
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    visit: Mapped[str] = mapped_column(String(64), unique=True)  # random, from the signed cookie
+    consented_at: Mapped[datetime] = mapped_column(default=now)
+    familiarity: Mapped[int | None]
+    completion_code: Mapped[str | None] = mapped_column(String(16), unique=True)
+    completed_at: Mapped[datetime | None]
+    withdrawn_at: Mapped[datetime | None]
+
+    trials: Mapped[list[Trial]] = relationship(order_by="Trial.order", back_populates="participant")
+
+    @property
+    def code(self) -> str:
+        """The opaque name in exports: P0001, P0002, ..."""
+        return f"P{self.id:04d}"
+
+
+class Trial(Base):
+    """One question assigned to one participant: its place in the order, its pair and its sides."""
+
+    __tablename__ = "trials"
+    __table_args__ = (UniqueConstraint("participant_id", "order"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    participant_id: Mapped[int] = mapped_column(ForeignKey("participants.id"), index=True)
+    order: Mapped[int]  # from 1
+    framing: Mapped[str] = mapped_column(String(100))
+    left: Mapped[str] = mapped_column(String(100))
+    right: Mapped[str] = mapped_column(String(100))
+    seed: Mapped[str] = mapped_column(String(50))  # "study seed/participant": what the design was drawn from
+
+    participant: Mapped[Participant] = relationship(back_populates="trials")
+    response: Mapped[Response | None] = relationship(back_populates="trial")
+
+
+class Response(Base):
+    """One committed answer. Sizes are in CSS pixels; times the device pixel ratio they are physical ones."""
+
+    __tablename__ = "responses"
+    __table_args__ = (
+        UniqueConstraint("participant_id", "trial_id"),
+        CheckConstraint("answer BETWEEN -2 AND 2", name="answer"),
+        CheckConstraint("rt_ms >= 0", name="rt_ms"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    participant_id: Mapped[int] = mapped_column(ForeignKey("participants.id"))
+    trial_id: Mapped[int] = mapped_column(ForeignKey("trials.id"), unique=True)
+    answer: Mapped[int]  # -2..2; negative: the left image looks more realistic
+    rt_ms: Mapped[int]
+    timed_by: Mapped[str] = mapped_column(String(7))  # browser | server
+    times_shown: Mapped[int]
+    started_at: Mapped[datetime]  # when the question was first served
+    answered_at: Mapped[datetime] = mapped_column(default=now)
+    image_left_sha256: Mapped[str] = mapped_column(String(64))
+    image_right_sha256: Mapped[str] = mapped_column(String(64))
+    viewport_width: Mapped[int | None]
+    viewport_height: Mapped[int | None]
+    device_pixel_ratio: Mapped[float | None]
+    shown_width: Mapped[float | None]
+    shown_height: Mapped[float | None]
+
+    trial: Mapped[Trial] = relationship(back_populates="response")
+
+
+class Event(Base):
+    """What happened to a participant and when: consented, rated, shown, refused, completed, withdrew."""
+
+    __tablename__ = "events"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    participant_id: Mapped[int] = mapped_column(ForeignKey("participants.id"))
+    trial_id: Mapped[int | None] = mapped_column(ForeignKey("trials.id"))
+    kind: Mapped[str] = mapped_column(String(20))
+    detail: Mapped[str | None] = mapped_column(String(200))
+    at: Mapped[datetime] = mapped_column(default=now)
+
+
+Index(None, Event.participant_id, Event.trial_id, Event.kind)

@@ -1,0 +1,233 @@
+"""The pages of the questionnaire. Each shows what the database says is due, whatever address was asked for."""
+
+from __future__ import annotations
+
+import secrets
+
+from flask import Blueprint, abort, flash, jsonify, redirect, render_template, request, session, url_for
+from sqlalchemy.orm import Session
+
+from app.models import Participant, Trial
+from app.questionnaire import flow
+from app.questionnaire.flow import Answer, Outcome
+from app.security import Limiter
+from app.web import database, simulated, study, wants_json
+
+blueprint = Blueprint("questionnaire", __name__)
+_code_attempts = Limiter(attempts=10, window_s=300)
+
+_LARGEST_RT_MS = 2**31 - 1
+_LARGEST_SIZE = 100_000
+
+
+@blueprint.get("/")
+def welcome():
+    """Consent; for somebody who has begun, the way back to where they were."""
+    with database().read() as db:
+        participant = _participant(db)
+        if participant is None:
+            if "visit" not in session:
+                if simulated():  # programs come in by /simulation/, with a visit; people stay out
+                    return render_template("questionnaire/simulated.html")
+                session["visit"] = secrets.token_urlsafe(16)
+                session.permanent = True
+            return render_template("questionnaire/consent.html", questions=_number_of_questions())
+        place = _place(db, participant)
+        if place in ("questionnaire.thanks", "questionnaire.withdrawn"):
+            return redirect(url_for(place))
+        return render_template("questionnaire/back.html", place=place, **_progress(db, participant))
+
+
+@blueprint.post("/")
+def consent():
+    if "visit" not in session:
+        abort(400, "Your browser keeps no cookies. Allow cookies for this site, reload and try again.")
+    if request.form.get("consent") != "yes":
+        flash("Please tick the box if you want to take part.")
+        return redirect(url_for(".welcome"), 303)
+    with database().write() as db:
+        participant = flow.enrol(db, study(), session["visit"])
+        place = _place(db, participant)
+    return redirect(url_for(place), 303)
+
+
+@blueprint.get("/familiarity")
+def familiarity():
+    with database().read() as db:
+        participant = _participant(db)
+        if elsewhere := _elsewhere(db, participant):
+            return elsewhere
+        return render_template("questionnaire/familiarity.html", participant=participant)
+
+
+@blueprint.post("/familiarity")
+def rate():
+    value = _integer("familiarity", 1, len(study().asked.familiarity.labels))
+    if value is None:
+        flash("Please choose one of the levels.")
+        return redirect(url_for(".familiarity"), 303)
+    with database().write() as db:
+        participant = _participant(db)
+        if participant:
+            flow.rate(db, participant, value)
+        place = _place(db, participant)
+    return redirect(url_for(place), 303)
+
+
+@blueprint.get("/question")
+def question():
+    with database().write() as db:
+        participant = _participant(db)
+        if elsewhere := _elsewhere(db, participant):
+            return elsewhere
+        trial = flow.current(db, participant)
+        flow.show(db, trial)
+        return render_template(
+            "questionnaire/question.html",
+            participant=participant,
+            trial=trial,
+            framing=study().framings.index(trial.framing),
+            images=_images(trial),
+            upcoming=_images(flow.following(db, trial)),
+            **_progress(db, participant),
+        )
+
+
+@blueprint.post("/question")
+def answer():
+    trial, value = _integer("trial", 1, 2**63 - 1), _integer("answer", -2, 2)
+    if trial is None:
+        abort(400, "The form did not say which question it answers. Reload the page.")
+    if value is None:
+        if wants_json():
+            abort(400, "The form held no answer from -2 to 2.")
+        flash("Please choose one of the five answers.")
+        return redirect(url_for(".question"), 303)
+    given = Answer(
+        value=value,
+        rt_ms=_integer("rt_ms", 0, _LARGEST_RT_MS),
+        image_left_sha256=request.form.get("image_left", ""),
+        image_right_sha256=request.form.get("image_right", ""),
+        viewport_width=_integer("viewport_width", 1, _LARGEST_SIZE),
+        viewport_height=_integer("viewport_height", 1, _LARGEST_SIZE),
+        device_pixel_ratio=_number("device_pixel_ratio", 100),
+        shown_width=_number("shown_width", _LARGEST_SIZE),
+        shown_height=_number("shown_height", _LARGEST_SIZE),
+    )
+    with database().write() as db:
+        participant = _participant(db)
+        if participant is None:
+            abort(400, "This browser has not begun the questionnaire.")
+        outcome = flow.answer(db, study(), participant, trial, given)
+    with database().write() as db:  # the answer is on the disk: now the committed answers can be counted
+        participant = _participant(db)
+        flow.complete(db, participant)
+        place = _place(db, participant)
+    kept = outcome in (Outcome.RECORDED, Outcome.REPEATED)
+    if wants_json():
+        return jsonify(outcome=outcome.value, next=url_for(place)), 200 if kept else 409
+    if outcome is Outcome.REFUSED:
+        flash("That question was answered already; the first answer was kept.")
+    elif outcome is Outcome.STALE:
+        flash("That was not the current question; nothing was changed. Please go on here.")
+    return redirect(url_for(place), 303)
+
+
+@blueprint.get("/thanks")
+def thanks():
+    with database().write() as db:
+        participant = _participant(db)
+        if participant:
+            flow.complete(db, participant)  # where the server stopped between the last answer and the count
+        if elsewhere := _elsewhere(db, participant):
+            return elsewhere
+        return render_template("questionnaire/thanks.html", participant=participant, **_progress(db, participant))
+
+
+@blueprint.get("/withdraw")
+def withdraw():
+    with database().read() as db:
+        return render_template("questionnaire/withdraw.html", participant=_participant(db))
+
+
+@blueprint.post("/withdraw")
+def withdraw_now():
+    """Withdraw this browser's participant, or the one who was given a completion code."""
+    with database().write() as db:
+        if "code" in request.form:
+            if not _code_attempts.allow(request.remote_addr):
+                abort(429, "Too many codes were tried. Wait five minutes and try again.")
+            participant = flow.find_by_code(db, request.form["code"])
+            if participant is None:
+                flash("No participant was given this code. Please check it.")
+                return redirect(url_for(".withdraw"), 303)
+            session["visit"] = participant.visit
+        elif (participant := _participant(db)) is None:
+            return redirect(url_for(".withdraw"), 303)
+        flow.withdraw(db, participant)
+    return redirect(url_for(".withdrawn"), 303)
+
+
+@blueprint.get("/withdrawn")
+def withdrawn():
+    with database().read() as db:
+        return _elsewhere(db, _participant(db)) or render_template("questionnaire/withdrawn.html")
+
+
+@blueprint.post("/another")
+def another():
+    """Let another person begin in this browser."""
+    session.pop("visit", None)
+    return redirect(url_for(".welcome"), 303)
+
+
+def _participant(db: Session) -> Participant | None:
+    return flow.find(db, session.get("visit"))
+
+
+def _place(db: Session, participant: Participant | None) -> str:
+    """The page that is due."""
+    if participant is None:
+        return "questionnaire.welcome"
+    if participant.withdrawn_at:
+        return "questionnaire.withdrawn"
+    if participant.familiarity is None:
+        return "questionnaire.familiarity"
+    return "questionnaire.question" if flow.current(db, participant) else "questionnaire.thanks"
+
+
+def _elsewhere(db: Session, participant: Participant | None):
+    """A redirect to the page that is due, unless it is the one asked for."""
+    place = _place(db, participant)
+    return None if place == request.endpoint else redirect(url_for(place), 303)
+
+
+def _progress(db: Session, participant: Participant) -> dict[str, int]:
+    return {"answered": flow.count_answers(db, participant), "questions": len(participant.trials)}
+
+
+def _number_of_questions() -> int:
+    pairs = len(study().techniques) * (len(study().techniques) - 1) // 2
+    return len(study().framings) * pairs
+
+
+def _images(trial: Trial | None):
+    """The left and right image of a trial; nothing after the last one."""
+    return [study().image(trial.framing, side) for side in (trial.left, trial.right)] if trial else []
+
+
+def _integer(name: str, low: int, high: int) -> int | None:
+    """A whole number in a field of the form; None where it is absent, not a number or out of range."""
+    try:
+        value = int(request.form.get(name, ""))
+    except ValueError:
+        return None
+    return value if low <= value <= high else None
+
+
+def _number(name: str, high: float) -> float | None:
+    try:
+        value = float(request.form.get(name, ""))
+    except ValueError:
+        return None
+    return value if 0 < value <= high else None

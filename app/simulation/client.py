@@ -1,0 +1,123 @@
+"""A participant without a body: reads the pages of the questionnaire and sends their forms, as a browser would."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+from typing import Any
+from urllib.parse import urljoin
+
+import httpx
+
+from app.errors import InputError
+from app.simulation.people import Crowd
+from app.study import Study
+
+TIMEOUT_S = 60
+#: What a browser on a 1920 x 1080 screen would report.
+WINDOW = {"viewport_width": 1920, "viewport_height": 963, "device_pixel_ratio": 1, "shown_width": 955.5, "shown_height": 537.47}
+
+
+@dataclass
+class Form:
+    """A form of a page: where it goes and its named fields with their values."""
+
+    action: str
+    fields: dict[str, str] = field(default_factory=dict)
+
+
+class _Forms(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.forms: list[Form] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        attributes = dict(attrs)
+        if tag == "form":
+            self.forms.append(Form(attributes.get("action") or ""))
+        elif tag == "input" and self.forms and attributes.get("name"):
+            chosen = attributes.get("type") not in ("radio", "checkbox") or "checked" in attributes
+            self.forms[-1].fields.setdefault(attributes["name"], (attributes.get("value") or "") if chosen else "")
+
+
+class Visitor:
+    """Simulated participants at one address, one after the other."""
+
+    def __init__(self, url: str, study: Study, crowd: Crowd, seed: int):
+        self._base = url.rstrip("/") + "/"
+        self._study, self._crowd, self._seed = study, crowd, seed
+
+    def status(self) -> dict[str, Any]:
+        """What the server says of its simulation; refused unless it is one, of this study and seed."""
+        address = urljoin(self._base, "simulation/status.json")
+        try:
+            answer = httpx.get(address, timeout=TIMEOUT_S)
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise InputError(f"--url {self._base}: no answer ({error or type(error).__name__})") from None
+        try:
+            status = answer.json() if answer.status_code == 200 else {}
+        except ValueError:
+            status = {}
+        if status.get("kind") != "simulated":
+            raise InputError(f"--url {self._base}: expected a simulated study, and real databases take no simulated participants")
+        if (status["study"], status["version"]) != (self._study.name, self._study.version):
+            raise InputError(
+                f"--url {self._base}: serves {status['study']} version {status['version']}, "
+                f"expected {self._study.name} version {self._study.version}"
+            )
+        if status["seed"] not in (None, self._seed):
+            raise InputError(f"--seed {self._seed}: these participants were begun with the seed {status['seed']}; go on with it")
+        return status
+
+    def take_part(self, number: int) -> Iterator[int]:
+        """Answer every question that participant `number` has not answered yet; yields each one's order."""
+        with httpx.Client(follow_redirects=True, timeout=TIMEOUT_S) as http:
+            page = self._get(http, "simulation/")
+            page = self._send(http, page, "seed", number=number, seed=self._seed)
+            if form := _find(page, "consent"):
+                page = self._send(http, page, "consent", consent="yes")
+            elif not str(page.url).endswith("/thanks"):
+                page = self._get(http, "question")  # half-way: the page that is due
+            if form := _find(page, "familiarity"):
+                page = self._send(http, page, "familiarity", familiarity=self._crowd.familiarity(number))
+            order = self._answered(number)
+            while form := _find(page, "trial"):
+                order += 1
+                framing, left, right = self._seen(form)
+                answer, rt_ms = self._crowd.answer(number, order, framing, left, right)
+                page = self._send(http, page, "trial", answer=answer, rt_ms=rt_ms, **WINDOW)
+                yield order
+            if 'id="completion-code"' not in page.text:
+                raise RuntimeError(f"participant {number} got no completion code at {page.url}")
+
+    def _answered(self, number: int) -> int:
+        return next((p["answers"] for p in self.status()["participants"] if p["number"] == number), 0)
+
+    def _seen(self, form: Form) -> tuple[str, str, str]:
+        """Framing, left and right technique. The page names neither (people must not know): the hashes tell."""
+        left, right = (self._study.images_by_sha256[form.fields[name]] for name in ("image_left", "image_right"))
+        return left.framing, left.technique, right.technique
+
+    def _get(self, http: httpx.Client, path: str) -> httpx.Response:
+        return _checked(http.get(urljoin(self._base, path)))
+
+    def _send(self, http: httpx.Client, page: httpx.Response, name: str, **filled: Any) -> httpx.Response:
+        """Fill in the form that has a field of that name, and send it."""
+        form = _find(page, name)
+        if form is None:
+            raise RuntimeError(f"{page.url} has no form with the field {name}")
+        data = form.fields | {key: str(value) for key, value in filled.items()}
+        return _checked(http.post(urljoin(str(page.url), form.action), data=data))
+
+
+def _find(page: httpx.Response, name: str) -> Form | None:
+    parser = _Forms()
+    parser.feed(page.text)
+    return next((form for form in parser.forms if name in form.fields), None)
+
+
+def _checked(page: httpx.Response) -> httpx.Response:
+    if page.status_code != 200:
+        raise RuntimeError(f"{page.url} answered {page.status_code}")
+    return page

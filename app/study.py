@@ -1,0 +1,71 @@
+"""The study that is asked: a manifest and the handful of look-ups that the web needs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from stimuli.manifest import Image, Manifest, load_manifest
+from stimuli.study import Study as Definition
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study folder: DIR/manifest.json, its images, and the databases and reports beside it."""
+
+    manifest: Manifest
+
+    @classmethod
+    def open(cls, study_dir: str | Path) -> Study:
+        """Load and verify a study folder; every image's size and sha256 are checked."""
+        return cls(load_manifest(study_dir))
+
+    @property
+    def directory(self) -> Path:
+        return self.manifest.directory.resolve()
+
+    @property
+    def asked(self) -> Definition:
+        """The definition: title, question, scale, familiarity, consent, labels."""
+        return self.manifest.study
+
+    @property
+    def name(self) -> str:
+        return self.asked.name
+
+    @property
+    def version(self) -> int:
+        return self.asked.version
+
+    @property
+    def seed(self) -> int:
+        return self.asked.seed
+
+    @cached_property
+    def framings(self) -> tuple[str, ...]:
+        return tuple(framing.name for framing in self.asked.framings)
+
+    @cached_property
+    def techniques(self) -> tuple[str, ...]:
+        return tuple(condition.name for condition in self.asked.techniques)
+
+    @cached_property
+    def design(self) -> str:
+        """The names, in the order of the study: what must stay for answers to belong together (JSON)."""
+        return json.dumps({"framings": self.framings, "techniques": self.techniques})
+
+    @cached_property
+    def images_by_sha256(self) -> dict[str, Image]:
+        return {image.sha256: image for image in self.manifest.images}
+
+    def image(self, framing: str, technique: str) -> Image:
+        return self.manifest.image(framing, technique)
+
+    def database_url(self, simulated: bool) -> str:
+        return f"sqlite:///{self.directory / ('simulated.sqlite3' if simulated else 'study.sqlite3')}"
+
+    def report(self, simulated: bool) -> Path:
+        """Where the report on the answers of this kind is looked for."""
+        return self.directory / ("simulated/report" if simulated else "report") / "report.html"
