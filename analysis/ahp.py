@@ -101,7 +101,7 @@ def priorities(matrix: np.ndarray) -> Priorities:
     principal = np.argmax(values.real)
     vector = np.abs(vectors[:, principal].real)
     lambda_max = float(values[principal].real)
-    ci = (lambda_max - n) / (n - 1) if n > 2 else 0.0
+    ci = (lambda_max - n) / (n - 1) if n > 2 and abs(lambda_max - n) > 1e-12 * n else 0.0
     if n > len(RANDOM_INDEX):
         cr = None
     else:

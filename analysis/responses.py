@@ -120,7 +120,7 @@ def responses_from_records(
 
 
 def _parse(name: str, data: bytes) -> tuple[pd.DataFrame, list[str], list[Finding]]:
-    """The cells as text, with line and last_line; the lines of the file; findings for the rows that have not the header's fields."""
+    """The cells as text, with line and last_line; the lines of the file; a finding for each row that has not the header's fields."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -191,7 +191,7 @@ def _tidy(
     values, reasons = _checked(raw, codebook)
     simulated = _one_kind(name, raw)
     findings = findings + [
-        _finding(raw.line[at], raw.last_line[at], "malformed", "; ".join(reasons[at]), lines) for at in sorted(reasons)
+        _finding(raw.line[at], raw.last_line[at], "malformed", _some(reasons[at], 3, "; "), lines) for at in sorted(reasons)
     ]
     frame = raw[["participant", "framing", "left", "right", "line", "last_line"]].join(values).drop(index=list(reasons))
     if frame.empty:
@@ -342,7 +342,7 @@ def _notes(frame: pd.DataFrame, raw: pd.DataFrame, codebook: Codebook) -> Iterab
         yield f"No answers at all for {_some(absent)}."
 
 
-def _some(names: list[str], most: int = 6) -> str:
+def _some(names: list[str], most: int = 6, mark: str = ", ") -> str:
     """The names in one phrase, cut after `most`."""
-    shown = ", ".join(map(str, names[:most]))
+    shown = mark.join(map(str, names[:most]))
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

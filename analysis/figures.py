@@ -1,0 +1,413 @@
+"""The thesis's figures 5.3 to 5.9, for any response table, at journal column width.
+
+Okabe-Ito palette (safe for colour-blind readers), outlined fonts, the same bytes on every run.
+Every figure of simulated answers carries a mark that says so.
+"""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
+
+from . import tallies
+from .ahp import Priorities
+from .codebook import Codebook
+from .responses import Responses
+
+SIMULATED = "SIMULATED ANSWERS"
+#: M. Okabe and K. Ito, "Color Universal Design", 2002.
+BLUE, SKY, ORANGE, VERMILLION, GREEN = "#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73"
+GREY, INK = "#C8C8C8", "#222222"
+#: One colour for each of the five answers, from strong for the first to strong for the second, and for the text on it.
+ANSWERS = (BLUE, SKY, GREY, ORANGE, VERMILLION)
+ON_ANSWERS = ("white", INK, INK, INK, "white")
+
+WIDTH_IN, NARROW_IN = 7.0, 4.6
+BANNER_IN = 0.26
+RC = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8,
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#666666",
+    "axes.axisbelow": True,
+    "text.color": INK,
+    "text.parse_math": False,
+    "axes.labelcolor": INK,
+    "xtick.color": "#444444",
+    "ytick.color": INK,
+    "ytick.major.size": 0,
+    "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "subdermal",
+    "figure.dpi": 100,
+    "savefig.dpi": 200,
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as bytes; `name` is its file name without suffix, `alt` what it shows, for those who cannot see it."""
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    svg: bytes
+    png: bytes
+
+
+def _picture(
+    name: str, title: str, caption: str, alt: str, draw: Callable[..., Figure], *args: object, simulated: bool = False
+) -> Picture:
+    """Draw with our style and save; nothing global changes."""
+    with matplotlib.rc_context({**matplotlib.rcParamsDefault, "backend": "agg", **RC}):
+        figure = draw(*args)
+        if simulated:
+            _mark(figure)
+        about = f"{SIMULATED}. {title}" if simulated else title
+        svg, png = io.BytesIO(), io.BytesIO()
+        figure.savefig(svg, format="svg", metadata={"Date": None, "Title": about})
+        figure.savefig(png, format="png", metadata={"Title": about})
+    return Picture(name, title, caption, f"{SIMULATED}. {alt}" if simulated else alt, svg.getvalue(), png.getvalue())
+
+
+def _mark(figure: Figure) -> None:
+    """A strip across the top, in room added for it, that says that no person gave these answers."""
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, height + BANNER_IN)
+    strip = BANNER_IN / (height + BANNER_IN)
+    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 1.2 * strip))
+    figure.add_artist(Rectangle((0, 1 - strip), 1, strip, facecolor=VERMILLION, transform=figure.transFigure))
+    figure.text(
+        0.5, 1 - strip / 2, SIMULATED, color="white", weight="bold", size=11, ha="center", va="center_baseline"
+    )
+
+
+def _panels(count: int, columns: int, height_in: float, width_in: float = WIDTH_IN, **share: object) -> tuple[Figure, list[Axes]]:
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(width_in, rows * height_in), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **share).ravel()
+    for spare in axes[count:]:
+        spare.remove()
+    return figure, list(axes[:count])
+
+
+def _wrapped(label: str, width: int = 20, most: int = 3) -> str:
+    lines = textwrap.wrap(label.replace("_", "_\u200b"), width, break_long_words=True) or [label]
+    lines = [line.replace("\u200b", "") for line in lines]
+    return "\n".join(lines[:most]) + ("…" if len(lines) > most else "")
+
+
+def _bars(
+    values: Mapping[str, Mapping[str, float]], titles: Mapping[str, str], labels: Mapping[str, str], axis: str, digits: int
+) -> Figure:
+    """One panel a framing, one bar a technique; a technique without a value there gets no bar and says so."""
+    figure, panels = _panels(len(values), 3, 0.75 + 0.27 * len(labels), sharex=True, sharey=True)
+    top = max((value for one in values.values() for value in one.values()), default=0) or 1
+    for ax, (framing, one) in zip(panels, values.items(), strict=True):
+        for place, technique in enumerate(labels):
+            value = one.get(technique)
+            if value is None:
+                ax.text(0, place, " no value", va="center", size=7, style="italic", color="#666666")
+            else:
+                ax.barh(place, value, height=0.66, color=BLUE)
+                _value(ax, value, place, f"{value:.{digits}f}")
+        ax.set_title(titles[framing], loc="left")
+        ax.set_xlim(0, top * 1.2)
+        ax.xaxis.set_major_locator(MaxNLocator(4, integer=digits == 0))
+        ax.grid(axis="x")
+        ax.set_yticks(range(len(labels)), [_wrapped(label) for label in labels.values()])
+        ax.set_ylim(len(labels) - 0.5, -0.5)
+        ax.tick_params(labelbottom=True)
+    figure.supxlabel(axis, size=8)
+    return figure
+
+
+def _value(ax: Axes, x: float, y: float, text: str) -> None:
+    """The number at the end of a bar, clear of grid lines."""
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+    ax.annotate(text, (x, y), xytext=(3, 0), textcoords="offset points", size=7.5, va="center_baseline", bbox=box)
+
+
+def _familiarity(table: pd.DataFrame) -> Figure:
+    figure, (ax,) = _panels(1, 1, 2.0, NARROW_IN)
+    ax.barh(table.level, table.participants, height=0.66, color=BLUE)
+    for level, count in zip(table.level, table.participants, strict=True):
+        _value(ax, count, level, f"{count}")
+    ax.set_yticks(table.level, [_wrapped(label, 28) for label in table.label])
+    ax.set_ylim(5.5, 0.5)
+    ax.set_xlim(0, max(table.participants.max(), 1) * 1.1)
+    ax.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    ax.grid(axis="x")
+    ax.set_xlabel("participants")
+    return figure
+
+
+def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], line: tallies.Trend | None) -> Figure:
+    figure, (ax,) = _panels(1, 1, 2.7, NARROW_IN)
+    distance = np.arange(1, len(table) + 1)
+    if line is not None:
+        ends = np.array([0.75, len(table) + 0.25])
+        fit = f"linear fit: {line.slope:+.1f} points per framing".replace("-", "\N{MINUS SIGN}")
+        fit += f", R² = {line.r2:.2f}" if np.isfinite(line.r2) else ""
+        ax.plot(ends, line.intercept + line.slope * ends, "--", color=VERMILLION, linewidth=1.2, label=fit)
+    ax.plot(distance, table.total, "o", markersize=6, color=BLUE, label="total of all techniques")
+    for x, total in zip(distance, table.total, strict=True):
+        below = line is not None and total < line.intercept + line.slope * x
+        place = {"xytext": (0, -8 if below else 7), "textcoords": "offset points", "va": "top" if below else "bottom"}
+        ax.annotate(f"{total}", (x, total), ha="center", size=7.5, **place)
+    ax.set_xticks(distance, [_wrapped(label, 16) for label in labels])
+    ax.set_xlim(0.6, len(table) + 0.4)
+    ax.set_ylim(0, max(table.total.max(), 1) * 1.18)
+    ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    ax.grid(axis="y")
+    ax.set_ylabel("points")
+    ax.set_xlabel("framing, from near to far" if len(table) > 1 else "framing")
+    ax.legend(loc="lower left")
+    return figure
+
+
+def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
+    """One panel a technique, one bar an opponent; the answers 'no difference' straddle the middle."""
+    techniques = list(dict.fromkeys(table.technique))
+    shares = 100 * table[list(tallies.DISTRIBUTION)].to_numpy() / table.n.to_numpy()[:, None]
+    starts = -(shares[:, 0] + shares[:, 1] + shares[:, 2] / 2)
+    opponents = table.groupby("technique").size().max()
+    figure, panels = _panels(len(techniques), 2, 0.62 + 0.25 * opponents, sharex=True)
+    for ax, technique in zip(panels, techniques, strict=True):
+        rows = table.technique == technique
+        about, share = table[rows], shares[rows]
+        left = starts[rows]
+        for answer, column in enumerate(tallies.DISTRIBUTION):
+            ax.barh(range(len(about)), share[:, answer], left=left, height=0.74, color=ANSWERS[answer], edgecolor="white", linewidth=0.4)
+            for place, count in enumerate(about[column]):
+                # a digit of 6.5 points needs about 4 % of a panel's width
+                if share[place, answer] >= 4 * len(str(count)):
+                    middle = left[place] + share[place, answer] / 2
+                    ax.text(
+                        middle, place, f"{count}", size=6.5, color=ON_ANSWERS[answer], ha="center", va="center_baseline"
+                    )
+            left = left + share[:, answer]
+        ax.axvline(0, color=INK, linewidth=0.7, zorder=0)
+        ax.set_title(codebook.label(technique), loc="left")
+        ax.set_yticks(range(len(about)), [_wrapped(codebook.label(name)) for name in about.opponent])
+        ax.set_ylim(len(about) - 0.5, -0.5)
+        ax.set_xlim(-100, 100)
+        ax.xaxis.set_major_locator(MultipleLocator(50))
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{abs(share):g} %"))
+        ax.tick_params(labelbottom=True)
+    keys = [Rectangle((0, 0), 1, 1, facecolor=colour) for colour in ANSWERS]
+    figure.legend(
+        keys,
+        ("strong", "slight", "no difference", "slight", "strong"),
+        title="←  the panel's technique is preferred      share of answers      the row's technique is preferred  →",
+        title_fontsize=8,
+        loc="outside lower center",
+        ncols=5,
+        handlelength=1.4,
+        columnspacing=2.4,
+    )
+    return figure
+
+
+def _pair(values: Mapping[str, np.ndarray], pair: tuple[str, str], codebook: Codebook) -> Figure:
+    """Box plot of one pair at each framing over all its points; whiskers reach the extremes."""
+    figure, (ax,) = _panels(1, 1, 1.15 + 0.62 * len(values), NARROW_IN)
+    places = range(len(values))
+    ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+    ax.boxplot(
+        list(values.values()),
+        orientation="horizontal",
+        positions=places,
+        widths=0.62,
+        whis=(0, 100),
+        patch_artist=True,
+        boxprops={"facecolor": "#DCEBF5", "edgecolor": BLUE, "linewidth": 0.9},
+        medianprops={"color": VERMILLION, "linewidth": 2.4, "solid_capstyle": "butt"},
+        whiskerprops={"color": BLUE, "linewidth": 0.9},
+        capprops={"color": BLUE, "linewidth": 0.9},
+    )
+    for place, answers in zip(places, values.values(), strict=True):
+        for value, count in zip(*np.unique(answers, return_counts=True), strict=True):
+            x, y, gap = _lattice(int(count))
+            ax.plot(value + x, place + 2 * y, "o", color=INK, markersize=min(3.2, 36 * gap), markeredgewidth=0, zorder=5)
+    a, b = (codebook.label(name) for name in pair)
+    ax.set_yticks(
+        places, [f"{_wrapped(codebook.framing_label(name))}\n(n = {len(values[name])})" for name in values]
+    )
+    ax.set_ylim(len(values) - 0.5, -0.5)
+    ax.set_xlim(-2.45, 2.45)
+    ax.set_xticks(
+        range(-2, 3),
+        [f"strong for\n{_wrapped(a, 15)}", "slight", "no difference", "slight", f"strong for\n{_wrapped(b, 15)}"],
+    )
+    ax.grid(axis="x")
+    return figure
+
+
+def _lattice(count: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Places for `count` dots around the origin, x and y within 0.2, and the gap between them."""
+    columns = int(np.ceil(np.sqrt(count)))
+    gap = min(0.085, 0.34 / columns)
+    place = np.arange(count)
+    rows = -(-count // columns)
+    return ((place % columns) - (columns - 1) / 2) * gap, ((place // columns) - (rows - 1) / 2) * gap, gap
+
+
+def draw_responses(
+    responses: Responses, found: Mapping[str, Priorities], pair: tuple[str, str], slugs: Mapping[str, str]
+) -> list[Picture]:
+    """All figures of a response table. found: priorities of the framings that have them; slugs: file names of the framings."""
+    codebook, simulated = responses.codebook, responses.simulated
+    used = [name for name in codebook.techniques if any(name in items for items in responses.items.values())]
+    labels = {name: codebook.label(name) for name in used}
+    scores, totals = tallies.scores(responses), tallies.totals(responses)
+    total = dict(zip(totals.framing, totals.total, strict=True))
+    points = {
+        framing: dict(zip(rows.technique, rows.score, strict=True)) for framing, rows in scores.groupby("framing", sort=False)
+    }
+    framings = [codebook.framing_label(name) for name in totals.framing]
+    pictures = [
+        _picture(
+            "scores",
+            "Scores per framing",
+            "Points of each technique (thesis, figure 5.3): a strong preference gives two, a slight one gives one, "
+            "no difference gives none.",
+            "; ".join(
+                f"{codebook.framing_label(framing)}: " + ", ".join(f"{labels[name]} {score}" for name, score in one.items())
+                for framing, one in points.items()
+            ),
+            _bars,
+            points,
+            {name: f"{codebook.framing_label(name)} ({total[name]})" for name in points},
+            labels,
+            "points (total of the framing in brackets)",
+            0,
+            simulated=simulated,
+        )
+    ]
+
+    levels = tallies.familiarity(responses)
+    pictures.append(
+        _picture(
+            "familiarity",
+            "Familiarity with computer graphics",
+            f"Self-rating of the {responses.participants} participants (thesis, figure 5.4).",
+            "; ".join(f"{row.label}: {row.participants}" for row in levels.itertuples()),
+            _familiarity,
+            levels,
+            simulated=simulated,
+        )
+    )
+
+    line = tallies.trend(totals)
+    pictures.append(
+        _picture(
+            "total_by_distance",
+            "Total of points against distance",
+            "Points given at each framing (thesis, figure 5.5)"
+            + (
+                ", with the least-squares line; the framings are taken as equally far apart."
+                if line
+                else ". Fewer than three framings: no line is fitted."
+            ),
+            "; ".join(f"{label}: {points}" for label, points in zip(framings, totals.total, strict=True)),
+            _total_by_distance,
+            totals,
+            framings,
+            line,
+            simulated=simulated,
+        )
+    )
+
+    distributions = tallies.distributions(responses)
+    for framing, table in distributions.groupby("framing", sort=False):
+        where = codebook.framing_label(framing)
+        pictures.append(
+            _picture(
+                f"preferences_{slugs[framing]}",
+                f"Each technique against each other one: {where}",
+                "How the answers divide (thesis, figures 5.6, 5.7a and 5.9). Bars to the left: the technique in the panel's title "
+                "was preferred; to the right: the one in the row. Numbers in the bars count answers.",
+                "; ".join(
+                    f"{codebook.label(row.technique)} against {codebook.label(row.opponent)}: "
+                    f"{row.strong_technique} strong and {row.slight_technique} slight for the first, {row.none} none, "
+                    f"{row.slight_opponent} slight and {row.strong_opponent} strong for the second"
+                    for row in table.itertuples()
+                    if codebook.techniques.index(row.technique) < codebook.techniques.index(row.opponent)
+                ),
+                _preferences,
+                table,
+                codebook,
+                simulated=simulated,
+            )
+        )
+
+    values = tallies.preferences(responses, pair)
+    if values:
+        a, b = (codebook.label(name) for name in pair)
+        pictures.append(
+            _picture(
+                "pair",
+                f"{a} against {b} at each framing",
+                "Box plot of all answers (thesis, figure 5.7b): box from the lower to the upper quartile, median in orange, "
+                "whiskers to the extremes, one dot an answer.",
+                "; ".join(
+                    f"{codebook.framing_label(framing)}: {(one < 0).sum()} for {a}, {(one == 0).sum()} none, "
+                    f"{(one > 0).sum()} for {b}, median {np.median(one):g}"
+                    for framing, one in values.items()
+                ),
+                _pair,
+                values,
+                tuple(pair),
+                codebook,
+                simulated=simulated,
+            )
+        )
+    if found:
+        shares = {framing: dict(zip(responses.items[framing], one.vector, strict=True)) for framing, one in found.items()}
+        pictures.append(draw_priorities(shares, found, codebook, simulated))
+    return pictures
+
+
+def draw_priorities(
+    shares: Mapping[str, Mapping[str, float]], found: Mapping[str, Priorities], codebook: Codebook, simulated: bool = False
+) -> Picture:
+    """AHP priorities, one panel a framing. shares: framing -> technique -> priority."""
+    used = [name for name in codebook.techniques if any(name in one for one in shares.values())]
+    titles = {
+        framing: f"{codebook.framing_label(framing)} (" + ("no CR" if one.cr is None else f"CR {one.cr:z.3f}") + ")"
+        for framing, one in found.items()
+    }
+    return _picture(
+        "priorities",
+        "AHP priorities per framing",
+        "Principal eigenvector of the matrix of judgements, scaled to sum 1 (thesis, table 5.2), with the consistency ratio.",
+        "; ".join(
+            f"{titles[framing]}: " + ", ".join(f"{codebook.label(name)} {share:.3f}" for name, share in one.items())
+            for framing, one in shares.items()
+        ),
+        _bars,
+        shares,
+        titles,
+        {name: codebook.label(name) for name in used},
+        "priority (sums to 1 within a framing)",
+        3,
+        simulated=simulated,
+    )

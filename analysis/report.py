@@ -1,0 +1,337 @@
+"""Puts tables, figures and words together: `tables/*.csv`, `figures/*.svg` and `.png`, and `report.html`, one page to read.
+
+Everything is made in memory first and then written file by file, each one whole or not at all; the report comes last.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import platform
+import re
+import tempfile
+from collections.abc import Iterable, Mapping
+from importlib import metadata
+from pathlib import Path
+
+import jinja2
+import numpy as np
+import pandas as pd
+
+from . import ahp, figures, tallies
+from .ahp import Comparison, Priorities
+from .codebook import Codebook
+from .errors import InputError
+from .responses import Responses
+
+TEMPLATES = Path(__file__).resolve().parents[1] / "templates" / "report"
+RULE = "Medians are taken above the diagonal, in this order of techniques, and inverted below it."
+#: How many unusable rows the page shows; tables/rejected_rows.csv holds all.
+SHOWN_ROWS = 100
+
+
+def report_responses(responses: Responses, pair: tuple[str, str] | None = None, command: str = "") -> dict[str, bytes]:
+    """All files of the analysis of a response table: path inside the output folder -> content.
+
+    pair: the two techniques of the box plot; without it golubev and golubev_plus where both are present, else the first two.
+    """
+    codebook = responses.codebook
+    pair = _pair(responses, pair)
+    slugs = file_names(responses.items)
+    scores, totals, sides = tallies.scores(responses), tallies.totals(responses), tallies.sides(responses)
+    comparisons = ahp.comparisons(responses)
+    found = _found(comparisons)
+    tables = {
+        "scores": scores,
+        "totals": totals,
+        "medians": ahp.medians(responses),
+        "distributions": tallies.distributions(responses),
+        "familiarity": tallies.familiarity(responses),
+        "sides": sides,
+        "ahp_priorities": ahp.priorities_table(comparisons),
+        "rejected_rows": pd.DataFrame(
+            [(one.line, one.last_line, one.kind, one.reason, one.row) for one in responses.findings],
+            columns=["line", "last_line", "kind", "reason", "row"],
+        ),
+    } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
+    if responses.simulated:
+        tables = {name: table.assign(simulated=1) for name, table in tables.items()}
+
+    pictures = figures.draw_responses(responses, found, pair, slugs)
+    first, last = (f"{time:%Y-%m-%d}" for time in (responses.frame.started_at.min(), responses.frame.started_at.max()))
+    return _files(
+        tables,
+        pictures,
+        title=codebook.title or "Answers to pairs of images",
+        subtitle="Which of two images looks more realistic: what was answered, and how it was counted.",
+        simulated=responses.simulated,
+        summary=_summary(responses, scores, totals, sides, comparisons, found, pair),
+        counts=[
+            ("participants", responses.participants),
+            ("answers", len(responses.frame)),
+            ("techniques", len({name for items in responses.items.values() for name in items})),
+            ("framings", len(responses.items)),
+            ("rows not used", len(responses.findings)),
+        ],
+        scores=_crossed(scores, "score", codebook, list(responses.items)),
+        totals=[
+            (codebook.framing_label(row.framing), row.total, row.answers, row.mean_strength) for row in totals.itertuples()
+        ],
+        sides=[(codebook.framing_label(row.framing), row.left, row.none, row.right) for row in sides.itertuples()],
+        matrices=_matrices(comparisons, found, codebook),
+        priorities=_crossed(tables["ahp_priorities"], "priority", codebook, list(responses.items)),
+        rule=RULE,
+        order=[codebook.label(name) for name in codebook.techniques],
+        order_rule=codebook.order_rule,
+        framings=[codebook.framing_label(name) for name in codebook.framings],
+        framing_rule=codebook.framing_rule,
+        notes=responses.notes,
+        findings=responses.findings[:SHOWN_ROWS],
+        rows=responses.rows,
+        period=f"on {first}" if first == last else f"from {first} to {last}",
+        seconds=float(responses.frame.rt_ms.median()) / 1000,
+        source=responses.source,
+        sha256=responses.sha256,
+        command=command,
+    )
+
+
+def report_matrices(comparisons: Mapping[str, Comparison], source: str = "", command: str = "") -> dict[str, bytes]:
+    """The same for matrices of judgements that were made elsewhere."""
+    items = next(iter(comparisons.values())).items
+    codebook = Codebook(tuple(comparisons), items, f"that of items in {source}", f"that of {source}")
+    found = _found(comparisons)
+    slugs = file_names(comparisons)
+    table = ahp.priorities_table(comparisons)
+    tables = {"ahp_priorities": table} | {f"ahp_matrix_{slugs[name]}": _matrix_table(one) for name, one in comparisons.items()}
+    shares = {name: dict(zip(items, one.vector, strict=True)) for name, one in found.items()}
+    return _files(
+        tables,
+        [figures.draw_priorities(shares, found, codebook)],
+        title="Priorities from matrices of judgements",
+        subtitle="The matrices as given, their priorities and how coherent they are.",
+        simulated=False,
+        summary=[
+            f"{codebook.framing_label(name)}: {_listed(_first(share, codebook))} comes first with a priority of "
+            f"{max(share.values()):.3f}. {_coherence(found[name])}"
+            for name, share in shares.items()
+        ],
+        counts=[("techniques", len(items)), ("framings", len(comparisons))],
+        matrices=_matrices(comparisons, found, codebook),
+        priorities=_crossed(table, "priority", codebook, list(comparisons)),
+        rule="The matrices were given; nothing was counted here.",
+        order=list(items),
+        order_rule=codebook.order_rule,
+        framings=list(comparisons),
+        framing_rule=codebook.framing_rule,
+        source=source,
+        command=command,
+    )
+
+
+def write_files(files: Mapping[str, bytes], out: str | Path) -> None:
+    """Write each file whole or not at all; what else lies in the folder stays."""
+    out = Path(out)
+    try:
+        for name, content in files.items():
+            path = out / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle, part = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(content)
+                os.chmod(part, 0o644)
+                os.replace(part, path)
+            except BaseException:
+                os.unlink(part)
+                raise
+    except OSError as error:
+        raise InputError(f"{error.filename or out}: cannot be written: {error.strerror}; expected a folder for --out") from None
+
+
+def file_names(names: Iterable[str]) -> dict[str, str]:
+    """Name -> a file name of its own, on any file system: letters, digits, '.', '_', '-', told apart whatever the case."""
+    slugs: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name)[:60].strip("._") or "framing"
+        slug, count = plain, 1
+        while slug.lower() in taken:
+            count += 1
+            slug = f"{plain}_{count}"
+        taken.add(slug.lower())
+        slugs[name] = slug
+    return slugs
+
+
+def _files(tables: Mapping[str, pd.DataFrame], pictures: list[figures.Picture], **page: object) -> dict[str, bytes]:
+    files = {
+        f"tables/{name}.csv": table.to_csv(index=False, float_format="%.10g", lineterminator="\n").encode()
+        for name, table in tables.items()
+    }
+    for picture in pictures:
+        files[f"figures/{picture.name}.svg"] = picture.svg
+        files[f"figures/{picture.name}.png"] = picture.png
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["inline"] = lambda svg: "data:image/svg+xml;base64," + base64.b64encode(svg).decode()
+    environment.filters["digits"] = _digits
+    page = {"versions": _versions(), "files": sorted(files), "pictures": {one.name: one for one in pictures}, **page}
+    files["report.html"] = environment.get_template("report.html").render(page).encode()
+    return files
+
+
+def _versions() -> dict[str, str]:
+    versions = {"Python": platform.python_version()}
+    for name in ("subdermal", "numpy", "pandas", "matplotlib"):
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = "not installed as a package"
+    return versions
+
+
+def _digits(value: float | None, digits: int = 3) -> str:
+    return "none" if value is None or np.isnan(value) else f"{value:z.{digits}f}"
+
+
+def _pair(responses: Responses, pair: tuple[str, str] | None) -> tuple[str, str]:
+    """The pair of the box plot, checked."""
+    present = [name for name in responses.codebook.techniques if any(name in items for items in responses.items.values())]
+    if pair is None:
+        known = ("golubev", "golubev_plus")
+        return known if set(known) <= set(present) else tuple(present[:2])
+    if len(pair) != 2 or pair[0] == pair[1] or not set(pair) <= set(present):
+        raise InputError(f"the pair is {','.join(pair)!r}, expected two different ones of {', '.join(present)}")
+    return tuple(pair)
+
+
+def _found(comparisons: Mapping[str, Comparison]) -> dict[str, Priorities]:
+    return {name: ahp.priorities(one.matrix) for name, one in comparisons.items() if not one.missing}
+
+
+def _matrix_table(comparison: Comparison) -> pd.DataFrame:
+    table = pd.DataFrame(comparison.matrix, columns=list(comparison.items))
+    table.insert(0, "technique", list(comparison.items), allow_duplicates=True)
+    return table
+
+
+def _matrices(comparisons: Mapping[str, Comparison], found: Mapping[str, Priorities], codebook: Codebook) -> list[dict]:
+    return [
+        {
+            "framing": codebook.framing_label(name),
+            "items": [codebook.label(item) for item in one.items],
+            "rows": [["" if np.isnan(cell) else f"{cell:.4g}" for cell in row] for row in one.matrix],
+            "missing": [f"{codebook.label(a)} with {codebook.label(b)}" for a, b in one.missing],
+            "found": found.get(name),
+        }
+        for name, one in comparisons.items()
+    ]
+
+
+def _crossed(table: pd.DataFrame, column: str, codebook: Codebook, framings: list[str]) -> dict:
+    """A table with one row a technique and one column a framing, for the page."""
+    cells = table.set_index(["technique", "framing"])[column]
+    used = [name for name in codebook.techniques if name in set(table.technique)]
+    return {
+        "framings": [codebook.framing_label(name) for name in framings],
+        "rows": [(codebook.label(name), [cells.get((name, framing)) for framing in framings]) for name in used],
+    }
+
+
+def _summary(
+    responses: Responses,
+    scores: pd.DataFrame,
+    totals: pd.DataFrame,
+    sides: pd.DataFrame,
+    comparisons: Mapping[str, Comparison],
+    found: Mapping[str, Priorities],
+    pair: tuple[str, str],
+) -> list[str]:
+    """What the numbers say, in sentences that hold for these answers and claim no more."""
+    codebook, frame = responses.codebook, responses.frame
+    sentences = []
+    if responses.simulated:
+        sentences.append("These answers were made by a program: no person was asked, and nothing here says how skin looks.")
+    people = _count(responses.participants, "simulated participant" if responses.simulated else "participant")
+    unused = f"{_count(len(responses.findings), 'row')} of the table could not be used; see below."
+    sentences.append(
+        f"{people} gave {_count(len(frame), 'answer')} at {_count(len(responses.items), 'framing')}. "
+        + (unused if responses.findings else "Every row of the table is counted.")
+    )
+    for framing, rows in scores.groupby("framing", sort=False):
+        points = dict(zip(rows.technique, rows.score, strict=True))
+        total, most, fewest = sum(points.values()), max(points.values()), min(points.values())
+        words = f"{codebook.framing_label(framing)}: "
+        if most == fewest:
+            words += f"all techniques have {_count(most, 'point')}."
+        else:
+            best, last = _first(points, codebook), [codebook.label(name) for name in points if points[name] == fewest]
+            words += (
+                f"{_listed(best)} got the most points ({most}{' each' if len(best) > 1 else ''} of {total}), "
+                f"{_listed(last)} the fewest ({fewest}{' each' if len(last) > 1 else ''})."
+            )
+            if framing in found:
+                shares = dict(zip(comparisons[framing].items, found[framing].vector, strict=True))
+                top = _first(shares, codebook)
+                if len(top) == len(shares):
+                words += " The AHP priorities put none before another."
+            else:
+                words += f" The AHP priorities put {_listed(top)} first{' too' if top == best else ''}."
+        if framing in found:
+            words += f" {_coherence(found[framing])}"
+        elif comparisons[framing].missing:
+            words += f" No priorities: {_count(len(comparisons[framing].missing), 'pair')} had no answer."
+        sentences.append(words)
+    if len(totals) > 1:
+        strength = totals.mean_strength.to_numpy()
+        steps = np.diff(strength)
+        falls, rises = (steps < 0).all(), (steps > 0).all()
+        way = "get weaker with every step" if falls else "get stronger with every step" if rises else "neither only weaken nor only grow"
+        values = ", ".join(
+            f"{row.mean_strength:.2f} ({codebook.framing_label(row.framing)})" for row in totals.itertuples()
+        )
+        sentences.append(f"From near to far, preferences {way}: on average an answer gave {values} points, of at most 2.")
+    a, b = (codebook.label(name) for name in pair)
+    values = "; ".join(
+        f"{codebook.framing_label(framing)} {(one < 0).sum()}, {(one == 0).sum()} and {(one > 0).sum()}"
+        for framing, one in tallies.preferences(responses, pair).items()
+    )
+    sentences.append(
+        f"{a} against {b}, in answers for the first, for neither and for the second: {values}."
+        if values
+        else f"{a} and {b} were never compared."
+    )
+    sentences.append(
+        f"Over all answers the image on the left was preferred {sides.left.sum()} times, the one on the right "
+        f"{sides.right.sum()} times; {sides.none.sum()} answers saw no difference."
+    )
+    sentences.append(
+        "These are counts of these answers. No test was made of whether other people would answer alike, "
+        "and where no preference shows, that alone does not make two techniques equal."
+    )
+    return sentences
+
+
+def _first(values: Mapping[str, float], codebook: Codebook) -> list[str]:
+    top = max(values.values())
+    return [codebook.label(name) for name, value in values.items() if np.isclose(value, top, rtol=1e-9)]
+
+
+def _coherence(found: Priorities) -> str:
+    if found.cr is None:
+        return f"There is {found.verdict}."
+    return f"The judgements are {found.verdict}, CR {found.cr:z.3f}."
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

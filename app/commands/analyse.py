@@ -1,0 +1,96 @@
+"""`subdermal analyse`: from a table of answers to tables, figures and a report."""
+
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+#: How many unusable rows are named on the terminal; tables/rejected_rows.csv holds all.
+SHOWN_ROWS = 20
+
+
+def names(ctx: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+    """'a, b,c' as ('a', 'b', 'c')."""
+    return None if value is None else tuple(name.strip() for name in value.split(","))
+
+
+@click.command()
+@click.argument("responses", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--out", required=True, type=click.Path(path_type=Path), help="Folder for tables/, figures/ and report.html; made when it is not there."
+)
+@click.option(
+    "--order", callback=names, metavar="A,B,C",
+    help="Every technique once: the order in which medians are taken. Without it the study's, or that of first appearance.",
+)
+@click.option(
+    "--pair", callback=names, metavar="A,B",
+    help="The two techniques of the box plot. Without it golubev,golubev_plus where both are there, else the first two.",
+)
+@click.option(
+    "--study", type=click.Path(path_type=Path), metavar="MANIFEST",
+    help="The study's manifest.json, or its folder, for labels and order. Without it the manifest.json beside RESPONSES, if any.",
+)
+@click.option(
+    "--matrices", type=click.Path(path_type=Path), metavar="FILE.toml",
+    help="Instead of RESPONSES: matrices of judgements, `items = [names]` and for each framing `[matrix.NAME]` with `rows = [[...], ...]`.",
+)
+def command(
+    responses: Path | None,
+    out: Path,
+    order: tuple[str, ...] | None,
+    pair: tuple[str, str] | None,
+    study: Path | None,
+    matrices: Path | None,
+) -> None:
+    """Turn the answers in RESPONSES, a responses.csv, into tables, figures and a report to read.
+
+    Rows that cannot be used are named with their line numbers, counted, and listed in the report.
+    """
+    from analysis.ahp import read_matrices
+    from analysis.codebook import is_manifest, read_manifest
+    from analysis.report import report_matrices, report_responses, write_files
+    from analysis.responses import read_responses
+
+    if (responses is None) == (matrices is None):
+        raise click.UsageError("expected either RESPONSES or --matrices FILE.toml")
+    if matrices is not None:
+        unused = [option for option, value in (("--order", order), ("--pair", pair), ("--study", study)) if value]
+        if unused:
+            raise click.UsageError(f"{', '.join(unused)} cannot go with --matrices, which has its own names and order")
+        found = read_matrices(matrices)
+        files = report_matrices(found, matrices.name, _written(("--matrices", matrices.name)))
+        write_files(files, out)
+        click.echo(f"{out / 'report.html'}: priorities of {len(found)} matrices")
+        return
+
+    notes = ()
+    beside = responses.parent / "manifest.json"
+    if study is None and beside.is_file():
+        if is_manifest(beside):
+            study = beside
+        else:
+            notes = ("The manifest.json beside the table is not one of a study; it was not used.",)
+    answers = read_responses(responses, study and read_manifest(study), order)
+    answers = replace(answers, notes=notes + answers.notes)
+    options = [(option, ",".join(value)) for option, value in (("--order", order), ("--pair", pair)) if value]
+    if study is not None:
+        options.append(("--study", study.name))
+    write_files(report_responses(answers, pair, _written((responses.name,), *options)), out)
+
+    for finding in answers.findings[:SHOWN_ROWS]:
+        click.echo(f"{responses}: {finding}", err=True)
+    for note in answers.notes:
+        click.echo(f"{responses}: {note}", err=True)
+    unused = len(answers.findings)
+    kind = "simulated answers" if answers.simulated else "answers"
+    click.echo(
+        f"{out / 'report.html'}: {len(answers.frame)} {kind} of {answers.participants} participants"
+        + (f"; {unused} of {answers.rows} rows not used, see {out / 'tables/rejected_rows.csv'}" if unused else "")
+    )
+
+
+def _written(*parts: tuple[str, ...]) -> str:
+    """The command as it is shown in the report: without folders, so that it says nothing of the machine and never changes."""
+    return shlex.join(["subdermal", "analyse", *(word for part in parts for word in part), "--out", "DIR"])
