@@ -10,6 +10,7 @@ SERVE ?= 1
 OUT ?= build/thesis
 PARTICIPANTS ?= 20
 SEED ?= 1
+PORT ?= 8000
 SUBDERMAL = .venv/bin/subdermal
 
 help:
@@ -25,7 +26,13 @@ test:
 demo: setup
 	$(SUBDERMAL) build stimuli/studies/thesis.toml --out $(OUT)
 	$(SUBDERMAL) simulate $(OUT) --participants $(PARTICIPANTS) --seed $(SEED)
-	$(SUBDERMAL) analyse $(OUT)/simulated.csv --out $(OUT)/report
+	$(SUBDERMAL) analyse $(OUT)/simulated/responses.csv --study $(OUT) --out $(OUT)/simulated/report
+ifeq ($(SERVE),0)
+	@echo "questionnaire and dashboard: $(SUBDERMAL) serve $(OUT)"
+	@echo "report: file://$(abspath $(OUT))/simulated/report/report.html"
+else
+	$(SUBDERMAL) serve $(OUT) --port $(PORT)
+endif
 
 clean:
 	rm -rf build *.egg-info

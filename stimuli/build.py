@@ -12,7 +12,8 @@ import hashlib
 import json
 import os
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -245,30 +246,25 @@ def _write_png(path: Path, pixels: np.ndarray, size: tuple[int, int]) -> str:
 
     if pixels.shape != (size[1], size[0], 3) or pixels.dtype != np.uint8:
         raise RuntimeError(f"{path}: rendered {pixels.shape} {pixels.dtype}, expected {(size[1], size[0], 3)} uint8")
-    with _Replacing(path) as temporary:
+    with _replacing(path) as temporary:
         PIL.Image.fromarray(pixels).save(temporary, format="PNG")
         return manifest.sha256(temporary)
 
 
 def _write_json(path: Path, record: dict) -> None:
-    with _Replacing(path) as temporary:
+    with _replacing(path) as temporary:
         temporary.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-class _Replacing:
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
     """A file to write beside `path`, which takes its place when the block ends well."""
-
-    def __init__(self, path: Path):
-        self.path, self.temporary = path, path.with_name(f".{path.name}.part")
-
-    def __enter__(self) -> Path:
-        return self.temporary
-
-    def __exit__(self, kind, *_):
-        if kind is None:
-            os.replace(self.temporary, self.path)
-        else:
-            self.temporary.unlink(missing_ok=True)
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def _jsonable(parameters: Any) -> dict:

@@ -1,0 +1,165 @@
+"""A small study of ready-made images, and a renderer that draws coloured rectangles instead of heads."""
+
+import hashlib
+import json
+import sys
+from dataclasses import dataclass
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import PIL.Image
+import pytest
+
+from stimuli.study import load_study
+
+TOML = """
+name = "small"
+title = "Which is rounder?"
+version = 3
+seed = 7
+
+[render]
+size = [32, 18]
+supersample = 1
+seed = 5
+
+[[framings]]
+name = "near"
+label = "Near"
+
+[[framings]]
+name = "far"
+label = "Far"
+
+[[techniques]]
+name = "plain"
+label = "Plain"
+
+[[techniques]]
+name = "soft"
+label = "Soft"
+technique = "blur"
+parameters = { radius_mm = 2.5 }
+"""
+
+
+@pytest.fixture
+def write_toml(tmp_path):
+    """Writes a study's TOML text, by default the small study's, and returns its path."""
+
+    def write(text=TOML):
+        path = tmp_path / "small.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def small_study(write_toml):
+    return load_study(write_toml())
+
+
+@pytest.fixture
+def ready_made(tmp_path):
+    """A folder with four images from nowhere in particular and a manifest written by hand."""
+    folder = tmp_path / "ready-made"
+    folder.mkdir()
+    images = []
+    for framing, size in (("near", (12, 8)), ("far", (6, 4))):
+        for value, technique in ((40, "unreal"), (200, "blender")):
+            file = f"{framing}-{technique}.png"
+            PIL.Image.new("RGB", size, (value, 90, 60)).save(folder / file)
+            digest = hashlib.sha256((folder / file).read_bytes()).hexdigest()
+            entry = {"framing": framing, "technique": technique, "file": file, "sha256": digest}
+            images.append({**entry, "width": size[0], "height": size[1]})
+    manifest = {
+        "format": "subdermal-manifest/1",
+        "study": {
+            "name": "engines",
+            "title": "Which engine?",
+            "version": 1,
+            "seed": 11,
+            "framings": [{"name": "near", "label": "Near"}, {"name": "far", "label": "Far"}],
+            "techniques": [{"name": "unreal", "label": "Unreal"}, {"name": "blender", "label": "Blender"}],
+        },
+        "images": images,
+    }
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    return folder
+
+
+class FakeInputError(ValueError):
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Plain:
+    pass
+
+
+@dataclass(frozen=True)
+class Blur:
+    radius_mm: float = 1.0
+
+    def __post_init__(self):
+        if not self.radius_mm > 0:
+            raise FakeInputError(f"radius_mm: got {self.radius_mm}, expected > 0")
+
+
+@dataclass
+class FakeRenderer:
+    """Draws a colour that depends on all that an image should depend on; `drawn` counts the images."""
+
+    model: str
+    size: tuple
+    supersample: int
+    seed: int
+    driver = "fake"
+    drawn = []
+    frames = []
+    stop_after = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def info(self):
+        return {"version": "1", "gl_vendor": type(self).driver}
+
+    def frame(self, framing):
+        FakeRenderer.frames.append(framing)
+
+        def render(parameters):
+            if len(FakeRenderer.drawn) == FakeRenderer.stop_after:
+                raise KeyboardInterrupt
+            FakeRenderer.drawn.append((framing, parameters))
+            colour = hashlib.sha256(repr((self, framing, parameters)).encode()).digest()[:3]
+            image = np.tile(np.frombuffer(colour, np.uint8), (self.size[1], self.size[0], 1))
+            return SimpleNamespace(image=image)
+
+        return SimpleNamespace(render=render)
+
+
+@pytest.fixture
+def fake_renderer(monkeypatch):
+    """Puts the fake in the place of the renderer and of the heads, and returns its class."""
+    renderer, errors, heads = ModuleType("renderer"), ModuleType("renderer.errors"), ModuleType("stimuli.heads")
+    errors.InputError = FakeInputError
+    renderer.errors, renderer.VERSION, renderer.Renderer = errors, "1", FakeRenderer
+    renderer.TECHNIQUES, renderer.FRAMINGS = {"plain": Plain, "blur": Blur}, {"near": 1, "far": 2}
+    head = SimpleNamespace(
+        name="default",
+        model="sphere",
+        provenance={"source": "a sphere"},
+        licences=[{"what": "sphere", "licence": "CC0-1.0", "source": "here"}],
+    )
+    heads.load_head = lambda name, unit=None: head
+    for module in (renderer, errors, heads):
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    for name, value in (("driver", "fake"), ("drawn", []), ("frames", []), ("stop_after", None)):
+        monkeypatch.setattr(FakeRenderer, name, value)
+    FakeRenderer.head = head
+    return FakeRenderer

@@ -1,0 +1,214 @@
+"""The build, with a renderer that draws coloured rectangles: what it renders, keeps, writes and refuses."""
+
+import dataclasses
+import json
+import os
+import shutil
+import subprocess
+
+import PIL.Image
+import pytest
+
+import stimuli.build
+from stimuli.build import Built, build
+from stimuli.errors import InputError, Stopped
+from stimuli.manifest import load_manifest, sha256
+from stimuli.study import load_study
+
+IMAGES = ["near_plain.png", "near_soft.png", "far_plain.png", "far_soft.png"]
+
+
+def contents(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "out"
+
+
+def test_manifest_tells_how_each_image_was_made(small_study, fake_renderer, out):
+    assert build(small_study, out) == Built(rendered=4, kept=0)
+    manifest = load_manifest(out)
+    assert manifest.study.record() == small_study.record()
+    assert [image.file for image in manifest.images] == [f"images/{file}" for file in IMAGES]
+    image = manifest.image("far", "soft")
+    assert image.sha256 == sha256(image.path) and PIL.Image.open(image.path).size == (32, 18)
+    assert image.parameters == {"technique": "blur", "supersample": 1, "radius_mm": 2.5}
+    assert image.seed == 5
+    assert image.renderer == {"version": "1", "gl_vendor": "fake", "commit": stimuli.build.commit()}
+    assert image.head == {"source": "a sphere"}
+    assert manifest.licences[0]["licence"] == "CC0-1.0"
+    assert len({image.sha256 for image in manifest.images}) == 4
+
+
+def test_shared_passes_are_drawn_once_per_framing(small_study, fake_renderer, out):
+    build(small_study, out)
+    assert fake_renderer.frames == ["near", "far"]
+
+
+def test_one_seed_gives_the_same_bytes_anywhere(small_study, fake_renderer, tmp_path):
+    build(small_study, tmp_path / "one")
+    build(small_study, tmp_path / "two")
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+    assert str(tmp_path).encode() not in b"".join(contents(tmp_path / "one").values())
+
+
+def test_second_build_renders_nothing_and_changes_nothing(small_study, fake_renderer, out):
+    build(small_study, out)
+    before = contents(out)
+    assert build(small_study, out) == Built(rendered=0, kept=4)
+    assert len(fake_renderer.drawn) == 4 and contents(out) == before
+    assert build(small_study, out, force=True) == Built(rendered=4, kept=0)
+    assert contents(out) == before
+
+
+def test_changed_parameters_render_that_technique_alone(write_toml, fake_renderer, out):
+    path = write_toml()
+    build(load_study(path), out)
+    fake_renderer.drawn.clear()
+    path = write_toml(path.read_text().replace("2.5", "4.0"))
+    assert build(load_study(path), out) == Built(rendered=2, kept=2)
+    assert {parameters.radius_mm for _, parameters in fake_renderer.drawn} == {4.0}
+    assert load_manifest(out).image("near", "soft").parameters["radius_mm"] == 4.0
+
+
+def test_new_wording_renders_nothing_but_reaches_the_manifest(small_study, fake_renderer, out):
+    build(small_study, out)
+    assert build(dataclasses.replace(small_study, title="Which is softer?", seed=8), out) == Built(0, 4)
+    assert load_manifest(out).study.title == "Which is softer?"
+
+
+@pytest.mark.parametrize("change", [{"size": (34, 18)}, {"supersample": 2}, {"seed": 6}])
+def test_other_rendering_renders_everything(small_study, fake_renderer, out, change):
+    build(small_study, out)
+    study = dataclasses.replace(small_study, render=dataclasses.replace(small_study.render, **change))
+    assert build(study, out) == Built(4, 0)
+    load_manifest(out)
+
+
+def test_other_head_or_source_renders_everything(small_study, fake_renderer, out, monkeypatch):
+    build(small_study, out)
+    fake_renderer.head.provenance = {"source": "a cube"}
+    assert build(small_study, out) == Built(4, 0)
+    monkeypatch.setattr(stimuli.build, "_source_digest", lambda: "another")
+    assert build(small_study, out) == Built(4, 0)
+
+
+def test_image_changed_by_hand_is_rendered_again(small_study, fake_renderer, out):
+    build(small_study, out)
+    before = contents(out)
+    (out / "images" / IMAGES[1]).write_bytes(b"scribble")
+    (out / "images" / IMAGES[2]).unlink()
+    assert build(small_study, out) == Built(2, 2)
+    assert contents(out) == before
+
+
+def test_images_of_a_study_come_from_one_driver(small_study, fake_renderer, out):
+    build(small_study, out)
+    (out / "images" / IMAGES[0]).unlink()
+    fake_renderer.driver = "another"
+    assert build(small_study, out) == Built(4, 0)
+    assert {image.renderer["gl_vendor"] for image in load_manifest(out).images} == {"another"}
+
+
+def test_interrupted_build_goes_on(small_study, fake_renderer, out, tmp_path):
+    fake_renderer.stop_after = 3
+    with pytest.raises(Stopped, match="stopped with 3 of 4 images rendered") as caught:
+        build(small_study, out)
+    assert caught.value.exit_code == 130
+    assert sorted(path.name for path in (out / "images").iterdir()) == sorted(IMAGES[:3])
+    with pytest.raises(InputError, match="not there"):
+        load_manifest(out)
+    fake_renderer.stop_after = None
+    assert build(small_study, out) == Built(rendered=1, kept=3)
+    build(small_study, tmp_path / "whole")
+    assert contents(out) == contents(tmp_path / "whole")
+
+
+def test_failing_disk_leaves_no_half_file(small_study, fake_renderer, out, monkeypatch):
+    build(small_study, out)
+    (out / "images" / IMAGES[0]).unlink()
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(OSError, match="No space"):
+        build(small_study, out)
+    assert sorted(path.name for path in (out / "images").iterdir()) == sorted(IMAGES[1:])
+
+
+def test_only_its_own_strays_are_removed(small_study, fake_renderer, out):
+    build(small_study, out)
+    shutil.copy(out / "images" / IMAGES[0], out / "images" / "mine.png")
+    (out / "images" / IMAGES[2]).write_bytes(b"kept, since it was changed")
+    (out / "study.sqlite3").write_bytes(b"answers")
+    near_only = dataclasses.replace(small_study, framings=small_study.framings[:1])
+    assert build(near_only, out) == Built(0, 2)
+    assert sorted(path.name for path in (out / "images").iterdir()) == sorted([*IMAGES[:3], "mine.png"])
+    assert (out / "study.sqlite3").read_bytes() == b"answers"
+    assert len(load_manifest(out).images) == 2
+
+
+def test_manifest_of_ready_made_images_is_not_overwritten(small_study, fake_renderer, ready_made):
+    before = contents(ready_made)
+    with pytest.raises(InputError, match="manifest.json: not written by a build, and not overwritten"):
+        build(small_study, ready_made, force=True)
+    assert contents(ready_made) == before
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"format": "subdermal-build/0", "images": {}}'])
+def test_foreign_record_is_refused(small_study, fake_renderer, out, text):
+    out.mkdir()
+    (out / "build.json").write_text(text)
+    with pytest.raises(InputError, match="build.json: not the record of a build"):
+        build(small_study, out)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"far"', '"farther"', r"framings\[1\]\.name: got 'farther', expected one of near, far"),
+        ('"blur"', '"blurred"', r"techniques\[1\]\.technique: got 'blurred', expected one of plain, blur"),
+        ("radius_mm", "radius", r"techniques\[1\]\.parameters: got 'radius', expected one of radius_mm"),
+        ("2.5", "-2.5", r"techniques\[1\]\.parameters: radius_mm: got -2.5, expected > 0"),
+    ],
+)
+def test_what_the_renderer_does_not_know_is_named_before_anything_is_written(write_toml, fake_renderer, out, old, new, message):
+    path = write_toml(write_toml().read_text().replace(old, new))
+    with pytest.raises(InputError, match=message):
+        build(load_study(path), out)
+    assert not out.exists() and not fake_renderer.drawn
+
+
+def test_renderer_that_returns_another_size_is_a_defect(small_study, fake_renderer, out):
+    study = dataclasses.replace(small_study, render=dataclasses.replace(small_study.render, size=(40, 20)))
+    with pytest.raises(RuntimeError, match=r"rendered \(18, 32, 3\)"):
+        stimuli.build._write_png(out, fake_renderer("sphere", (32, 18), 1, 0).frame("near").render(None).image, study.render.size)
+
+
+def test_commit_of_a_checkout(tmp_path, monkeypatch):
+    """The commit, "-dirty" when tracked source differs, nothing outside a checkout or below its top."""
+
+    def git(*args):
+        identity = ["-c", "user.name=n", "-c", "user.email=e@example.org"]
+        return subprocess.run(["git", "-C", tmp_path, *identity, *args], check=True, capture_output=True, text=True).stdout
+
+    monkeypatch.setattr(stimuli.build, "_ROOT", tmp_path)
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert stimuli.build.commit() is None
+    (tmp_path / "renderer").mkdir()
+    for name in ("renderer/a.py", "notes.txt"):
+        (tmp_path / name).write_text("1")
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-q", "-m", "first")
+    head = git("rev-parse", "HEAD").strip()
+    assert stimuli.build.commit() == head
+    (tmp_path / "notes.txt").write_text("2")
+    assert stimuli.build.commit() == head
+    (tmp_path / "renderer/a.py").write_text("2")
+    assert stimuli.build.commit() == head + "-dirty"
+    monkeypatch.setattr(stimuli.build, "_ROOT", tmp_path / "renderer")
+    assert stimuli.build.commit() is None

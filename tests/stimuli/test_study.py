@@ -1,0 +1,107 @@
+"""The definition of a study: the thesis's loads, and what is wrong in another is named."""
+
+import re
+
+import pytest
+
+from stimuli.errors import InputError
+from stimuli.study import THESIS, HeadChoice, Study, load_study, read_study
+from stimuli.table import Table
+
+
+def test_thesis_study():
+    """Chapter 4 of the thesis: five conditions at three framings; the order is that of its matrices."""
+    study = load_study(THESIS)
+    assert [framing.name for framing in study.framings] == ["close-up", "head-shot", "half-length"]
+    assert [(condition.name, condition.label) for condition in study.techniques] == [
+        ("none", "No SSS"),
+        ("jimenez_separable", "Separable"),
+        ("golubev", "Golubev"),
+        ("golubev_plus", "Golubev Plus"),
+        ("jimenez_gaussian", "Gaussian"),
+    ]
+    assert all(condition.technique == condition.name for condition in study.techniques)
+    assert [level.value for level in study.scale] == [-2, -1, 0, 1, 2]
+    assert len(study.familiarity.labels) == 5
+    assert study.render.size == (1920, 1080)
+    assert study.head == HeadChoice("default")
+
+
+def test_what_is_asked_defaults_to_the_thesis(small_study):
+    thesis = load_study(THESIS)
+    for part in ("question", "scale", "familiarity", "consent"):
+        assert getattr(small_study, part) == getattr(thesis, part)
+
+
+def test_technique_and_parameters_of_a_condition(small_study):
+    plain, soft = small_study.techniques
+    assert (plain.technique, plain.parameters) == ("plain", {})
+    assert (soft.technique, soft.parameters) == ("blur", {"radius_mm": 2.5})
+
+
+def test_record_is_read_back(small_study):
+    """What the manifest says of a study is the study, less how its images were made."""
+    again = read_study(Table(small_study.record(), "manifest"))
+    assert again.record() == small_study.record()
+    assert isinstance(again, Study) and again.render is None and again.head is None
+
+
+def test_head_file_lies_beside_the_study(write_toml):
+    path = write_toml(write_toml().read_text() + '\n[head]\nname = "scan.glb"\nunit = "cm"\n')
+    assert load_study(path).head == HeadChoice(str(path.parent / "scan.glb"), "cm")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "small"', 'name = "small', r"line 2"),
+        ('name = "small"', "", r"name: missing, expected a name"),
+        ('name = "small"', 'name = "Small one"', r"name: got 'Small one', expected a name of small letters"),
+        ('title = "Which is rounder?"', 'title = " "', r"title: got ' ', expected a text that is not blank"),
+        ("version = 3", "version = true", r"version: got True, expected an integer from 1"),
+        ("seed = 7", "seed = -1", r"seed: got -1, expected an integer from 0"),
+        ("seed = 7", "sede = 7", r"seed: missing"),
+        ("seed = 7", "seed = 7\nquestions = 1", r"questions: unknown key, did you mean 'question'\?"),
+        ("[32, 18]", "[32]", r"render\.size: got \[32\], expected \[width, height\] in pixels"),
+        ("[32, 18]", "[32.0, 18]", r"render\.size: got"),
+        ("supersample = 1", "supersample = 0", r"render\.supersample: got 0, expected an integer from 1 to 8"),
+        ("supersample = 1", "samples = 1", r"render\.samples: unknown key"),
+        ('name = "far"', 'name = "near"', r"framings\[1\]\.name: got 'near', expected a value that differs from framings\[0\]"),
+        ('label = "Soft"', 'label = "Plain"', r"techniques\[1\]\.label: got 'Plain', expected a value that differs"),
+        ('technique = "blur"', "technique = 3", r"techniques\[1\]\.technique: got 3, expected a name"),
+        ("{ radius_mm = 2.5 }", "2.5", r"techniques\[1\]\.parameters: got 2\.5, expected a table"),
+        ('label = "Soft"', 'label = "Soft"\nparams = {}', r"techniques\[1\]\.params: unknown key, did you mean 'parameters'"),
+        ("[render]", '[question]\ntext = "?"\nleft_label = "A"\n[render]', r"question\.right_label: missing"),
+        ("[render]", "scale = 5\n[render]", r"scale: got 5, expected a list of 5 tables"),
+        (
+            "[render]",
+            "scale = [" + ", ".join(f'{{value = {v}, label = "{v}"}}' for v in (-2, -1, 0, 2, 1)) + "]\n[render]",
+            r"scale\[3\]\.value: got 2, expected an integer from 1 to 1",
+        ),
+        ("[render]", '[familiarity]\nquestion = "?"\nlabels = ["a", "b"]\n[render]', r"familiarity\.labels: .* 5 texts"),
+        ("[render]", '[head]\nname = ""\n[render]', r"head\.name: got ''"),
+    ],
+)
+def test_faults_are_named(write_toml, old, new, message):
+    text = write_toml().read_text()
+    assert old in text
+    with pytest.raises(InputError, match=message) as caught:
+        load_study(write_toml(text.replace(old, new, 1)))
+    assert "small.toml" in str(caught.value) and "\n" not in str(caught.value)
+    assert caught.value.exit_code == 2
+
+
+def test_one_technique_is_no_comparison(write_toml):
+    text = write_toml().read_text()
+    with pytest.raises(InputError, match=r"techniques: got .*, expected a list of at least 2 tables"):
+        load_study(write_toml(text[: text.rindex("[[techniques]]")]))
+
+
+def test_unreadable_file(tmp_path):
+    with pytest.raises(InputError, match="no.toml: cannot be read: No such file"):
+        load_study(tmp_path / "no.toml")
+    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+        load_study(tmp_path)
+    (tmp_path / "latin.toml").write_bytes('a = 1\nname = "é"'.encode("latin-1"))
+    with pytest.raises(InputError, match=re.escape("latin.toml: line 2: not UTF-8 text")):
+        load_study(tmp_path / "latin.toml")

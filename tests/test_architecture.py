@@ -1,0 +1,71 @@
+"""Data flows one way: which package may import which, read from the source."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+MAY_IMPORT = {
+    "renderer": set(),
+    "analysis": set(),
+    "stimuli": {"renderer"},
+    "app": {"analysis", "stimuli.design", "stimuli.errors", "stimuli.manifest", "stimuli.study"},
+}
+# The verbs of the command line hand over to the stage that they are named after.
+MAY_ALSO_IMPORT = {
+    "app/commands/render.py": {"renderer", "stimuli.heads"},
+    "app/commands/build.py": {"stimuli.build"},
+}
+MODULES = [path for package in MAY_IMPORT for path in sorted((ROOT / package).rglob("*.py"))]
+
+
+def imported(source: str, package: str) -> set[str]:
+    """The dotted names that a module of `package` imports: modules, and what is taken from them."""
+    names = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parts = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            base = ".".join([*parts, *([node.module] if node.module else [])])
+            names.update(f"{base}.{alias.name}" for alias in node.names)
+    return names
+
+
+def forbidden(names: set[str], package: str, allowed: set[str]) -> set[str]:
+    """Those of `names` that lie in another package of ours and in none of the allowed modules."""
+    ours = {name for name in names if name.split(".")[0] in MAY_IMPORT and name.split(".")[0] != package}
+    return {name for name in ours if not any(f"{name}.".startswith(f"{module}.") for module in allowed)}
+
+
+def test_the_rule_finds_what_it_forbids():
+    source = "import renderer.gl\nfrom stimuli import build, study\nfrom .. import x\nfrom ..a import y\nimport numpy"
+    names = imported(source, "app.sub")
+    assert names == {"renderer.gl", "stimuli.build", "stimuli.study", "app.x", "app.a.y", "numpy"}
+    assert forbidden(names, "app", MAY_IMPORT["app"]) == {"renderer.gl", "stimuli.build"}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_imports(path):
+    relative = path.relative_to(ROOT)
+    package = relative.parts[0]
+    allowed = MAY_IMPORT[package] | MAY_ALSO_IMPORT.get(relative.as_posix(), set())
+    assert not forbidden(imported(path.read_text(), ".".join(relative.parts[:-1])), package, allowed)
+
+
+def test_application_never_imports_opengl():
+    """The questionnaire must run where there is no graphics at all."""
+    names = [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for path in sorted((ROOT / "app").rglob("*.py"))
+        if "migrations" not in path.parts
+    ]
+    assert {"app", "app.cli", "app.commands.serve", "app.commands.render"} <= set(names)
+    program = "import sys, importlib\nfor name in sys.argv[1:]: importlib.import_module(name)\nprint(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program, *names], cwd=ROOT, capture_output=True, text=True, check=True)
+    modules = set(run.stdout.split())
+    assert "flask" in modules
+    assert not modules & {"OpenGL", "pyrender", "pyglet", "renderer"}
