@@ -1,1 +1,18 @@
-"""The renderer: scene, passes and scattering techniques."""
+"""Renders one head under one light with every technique; see renderer.frame.Renderer.
+
+Importing this package does not touch OpenGL: names resolve on first use.
+"""
+
+from __future__ import annotations
+
+import importlib
+
+VERSION = "0.1.0"
+_WHERE = {"Renderer": "renderer.frame", "TECHNIQUES": "renderer.techniques", "make": "renderer.techniques",
+          "FRAMINGS": "renderer.scene"}
+
+
+def __getattr__(name: str):
+    if name not in _WHERE:
+        raise AttributeError(f"module 'renderer' has no attribute {name!r}")
+    return getattr(importlib.import_module(_WHERE[name]), name)

@@ -1,0 +1,2 @@
+// Depth first: the shading passes then touch each pixel once.
+void main() {}

@@ -1,0 +1,1 @@
+"""Diffusion profiles: numpy only, millimetres, no OpenGL."""

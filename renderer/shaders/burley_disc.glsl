@@ -1,0 +1,43 @@
+// One sample of Burley's disc in screen space (Golubev 2018), shared by golubev and golubev_plus.
+#include "shaders/common.glsl"
+uniform sampler2D irradiance; uniform sampler2D depth_normal;
+uniform vec4 samples[SAMPLES];    // x, y, radius in mm; 1 / density
+uniform vec3 shape;               // s = 1 / d per channel, 1/mm
+uniform float pixels_per_mm;      // at 1 mm
+uniform float filter_radius_mm;
+layout(location = 0) out vec4 scattered;
+layout(location = 1) out vec4 count;
+
+struct Pixel { vec3 irradiance; float depth; vec2 at; vec2 size; float scale; mat2 turn; };
+struct Sum { vec3 weight; vec3 light; };
+
+Pixel centre_pixel(vec4 centre) {
+    Pixel p;
+    p.irradiance = centre.rgb;
+    p.depth = texelFetch(depth_normal, ivec2(gl_FragCoord.xy), 0).x;
+    p.at = gl_FragCoord.xy;
+    p.size = vec2(textureSize(irradiance, 0));
+    p.scale = pixels_per_mm / p.depth;
+    float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
+    p.turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
+    return p;
+}
+
+// Adds sample k; returns its irradiance and whether it lies on scattering material.
+vec4 take(int k, Pixel p, inout Sum sum) {
+    vec4 s = samples[k];
+    vec2 there = (p.at + p.turn * s.xy * p.scale) / p.size;
+    vec4 e = texture(irradiance, there);
+    if (e.a < 0.5) return vec4(0.0);
+    float dz = texture(depth_normal, there).x - p.depth;
+    float r = sqrt(s.z * s.z + dz * dz);
+    vec3 third = exp(-shape * r / 3.0);
+    vec3 w = shape * (third * third * third + third) * s.w;  // R(r') r' over R(r) r
+    sum.weight += w;
+    sum.light += w * e.rgb;
+    return vec4(e.rgb, 1.0);
+}
+
+vec4 resolve(Pixel p, Sum sum) {
+    return vec4(mix(p.irradiance, sum.light / max(sum.weight, 1e-12), greaterThan(sum.weight, vec3(1e-8))), 1.0);
+}

@@ -1,0 +1,33 @@
+// The base samples measure contrast; the rest are taken only where it is high.
+#include "shaders/burley_disc.glsl"
+uniform float threshold;
+uniform float inner_mm;
+
+void main() {
+    vec4 centre = texelFetch(irradiance, ivec2(gl_FragCoord.xy), 0);
+    scattered = vec4(centre.rgb, 0.0);
+    count = vec4(0.0, 0.0, 0.0, 1.0);
+    if (centre.a < 0.5) return;
+    Pixel p = centre_pixel(centre);
+    scattered = vec4(centre.rgb, 1.0);
+    count.x = 1.0;
+    if (filter_radius_mm * p.scale < 1.0) return;
+    Sum sum = Sum(vec3(0.0), vec3(0.0));
+    vec4 inner = vec4(0.0), outer = vec4(0.0);
+    for (int k = 0; k < BASE; ++k) {
+        vec4 e = take(k, p, sum);
+        if (samples[k].z < inner_mm) inner += e; else outer += e;
+    }
+    vec3 contrast = vec3(0.0);
+    if (inner.a > 0.0 && outer.a > 0.0) {
+        vec3 l_in = inner.rgb / inner.a, l_out = outer.rgb / outer.a;
+        contrast = abs(l_in - l_out) / max(l_in + l_out, 1e-6);
+    }
+    count.x = float(BASE);
+    count.y = max(contrast.r, max(contrast.g, contrast.b));
+    if (any(greaterThanEqual(contrast, vec3(threshold)))) {
+        for (int k = BASE; k < SAMPLES; ++k) take(k, p, sum);
+        count.x = float(SAMPLES);
+    }
+    scattered = resolve(p, sum);
+}

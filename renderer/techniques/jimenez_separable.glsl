@@ -1,0 +1,35 @@
+// One of the two passes of the separable kernel.
+#include "shaders/common.glsl"
+uniform sampler2D source; uniform sampler2D irradiance; uniform sampler2D depth_normal;
+uniform vec4 kernel[TAPS];       // rgb weight, offset in mm
+uniform vec2 axis;
+uniform float pixels_per_mm;     // at 1 mm
+uniform float follow_surface_mm;
+uniform float near_mm;
+layout(location = 0) out vec4 scattered;
+layout(location = 1) out vec4 count;
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec4 centre = texelFetch(source, at, 0);
+    scattered = centre;
+    count = vec4(0.0, 0.0, 0.0, 1.0);
+    if (texelFetch(irradiance, at, 0).a < 0.5) return;
+    float depth = texelFetch(depth_normal, at, 0).x;
+    vec2 size = vec2(textureSize(source, 0)), uv = gl_FragCoord.xy / size;
+    float scale = pixels_per_mm / depth;
+    float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
+    mat2 turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
+    vec3 sum = vec3(0.0);
+    for (int k = 0; k < TAPS; ++k) {
+        float offset = kernel[k].w;
+        vec2 direction = abs(offset) < near_mm ? turn * axis : axis;
+        vec2 there = uv + direction * offset * scale / size;
+        vec3 tap = texture(source, there).rgb;
+        float away = abs(texture(depth_normal, there).x - depth) / follow_surface_mm;
+        if (texture(irradiance, there).a < 0.5) away = 1.0;
+        sum += kernel[k].rgb * mix(tap, centre.rgb, clamp(away, 0.0, 1.0));
+    }
+    scattered = vec4(sum, 1.0);
+    count.x = float(2 * TAPS);
+}

@@ -1,0 +1,104 @@
+"""Separable subsurface scattering.
+
+Jimenez, Zsolnai, Jarabo, Freude, Auzinger, Wu, von der Pahlen, Wimmer and Gutierrez 2015, Computer Graphics Forum 34(6),
+doi:10.1111/cgf.12529. One kernel, two passes; taps follow the surface; the near taps are rotated by a per-pixel angle
+that both passes share.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from OpenGL import GL
+
+from renderer import gl
+from renderer.profiles import gaussians
+from renderer.techniques.base import Inputs, Scattered, Technique, output_formats, parameter
+
+MOST_TAPS = 41
+
+
+def tap_offsets(taps: int, reach: float) -> np.ndarray:
+    """Offsets in [-reach, reach], dense at the centre: reach * sign(o) o^2, o uniform in [-1, 1]: (taps,)."""
+    o = np.linspace(-1, 1, taps)
+    return reach * np.sign(o) * o**2
+
+
+def demo_kernel(taps: int, strength=(0.48, 0.41, 0.28), falloff=(1.0, 0.37, 0.3)) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets (taps,) and weights (taps, 3) of the code published with the 2012 report ("Separable SSS" demo).
+
+    A radial slice of five of the six Gaussians with the red weights for all channels, stretched per channel by
+    `falloff` and blended with the centre by `strength`.
+    """
+    offsets = tap_offsets(taps, 3.0 if taps > 20 else 2.0)
+    r = np.abs(offsets)[:, None] / (0.001 + np.array(falloff))
+    profile = sum(w * np.exp(-r**2 / (2 * v)) / (2 * 3.14 * v)
+                  for w, v in zip(gaussians.SKIN_WEIGHTS[1:, 0], gaussians.SKIN_VARIANCE_MM2[1:], strict=True))
+    gap = np.abs(np.diff(offsets))
+    area = 0.5 * (np.append(0, gap) + np.append(gap, 0))[:, None]
+    weights = area * profile
+    weights /= weights.sum(axis=0)
+    strength = np.array(strength)
+    centre = taps // 2
+    weights *= strength
+    weights[centre] += 1 - strength
+    return offsets, weights
+
+
+def preintegrated_kernel(taps: int, reach_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets (taps,) mm and weights (taps, 3): a_p(x) of skin's six Gaussians, integrated over each tap's interval."""
+    offsets = tap_offsets(taps, reach_mm)
+    middle = 0.5 * (offsets[1:] + offsets[:-1])
+    edges = np.concatenate([[-np.inf], middle, [np.inf]])
+    return offsets, gaussians.line_integral(edges[:-1], edges[1:])
+
+
+@dataclass(frozen=True)
+class JimenezSeparable(Technique):
+    """kernel "preintegrated": the paper's analytic pre-integration of the same six Gaussians that jimenez_gaussian uses;
+    "demo": the artist's kernel of the published code, in which the first Gaussian is the strength."""
+
+    taps: int = parameter(25, unit="taps a pass", low=3, high=MOST_TAPS, source="published code: 11, 17 or 25")
+    kernel: str = parameter("preintegrated", unit="", choices=("preintegrated", "demo"), source="Jimenez 2015, sec. 5.1 and code")
+    reach_mm: float = parameter(6.0, unit="mm", low=0.1, high=50.0, source="more than two sigma of the widest Gaussian")
+    scale: float = parameter(1.0, unit="mm of skin per mm of kernel", low=0.01, high=20.0, source="sssWidth of the code, in physical units")
+    follow_surface_mm: float = parameter(5.0, unit="mm", low=0.01, high=1000.0,
+                                         source="code: saturate(300 dist sssWidth |dz|) is 1 at about 5 mm")
+    near_share: float = parameter(0.1, unit="of the kernel's width", low=0.0, high=1.0, source="Jimenez 2015, sec. 6: 10 %, 30 % in extreme close-up")
+
+    name: ClassVar[str] = "jimenez_separable"
+    title: ClassVar[str] = "Separable"
+    paper: ClassVar[str] = "Jimenez et al. 2015, doi:10.1111/cgf.12529"
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.taps % 2 == 0:
+            from renderer.errors import InputError
+
+            raise InputError(f"{self.name}.taps is {self.taps}; expected an odd number")
+
+    def kernel_table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Offsets (taps,) mm and weights (taps, 3) that sum to 1 per channel."""
+        return demo_kernel(self.taps) if self.kernel == "demo" else preintegrated_kernel(self.taps, self.reach_mm)
+
+    def self_check(self) -> None:
+        offsets, weights = self.kernel_table()
+        assert np.allclose(weights.sum(axis=0), 1, atol=1e-9) and np.isfinite(weights).all()
+        assert np.allclose(weights, weights[::-1]) and np.allclose(offsets, -offsets[::-1])
+
+    def scatter(self, inputs: Inputs) -> Scattered:
+        offsets, weights = self.kernel_table()
+        program = inputs.programs("techniques/jimenez_separable.glsl", {"TAPS": self.taps})
+        near = self.near_share * np.ptp(offsets)
+        common = dict(irradiance=inputs.irradiance, depth_normal=inputs.depth_normal, pixels_per_mm=inputs.pixels_per_mm * self.scale,
+                      kernel=np.column_stack([weights, offsets]), follow_surface_mm=self.follow_surface_mm, near_mm=near)
+        row = gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F, GL.GL_RGBA16F])
+        total = gl.Target(inputs.width, inputs.height, output_formats())
+        for target, source, axis in ((row, inputs.irradiance, (1.0, 0.0)), (total, row.textures[0], (0.0, 1.0))):
+            target.bind()
+            program.use(source=source, axis=axis, **common)
+            gl.draw_fullscreen(inputs.context)
+        row.delete()
+        return Scattered(total)
