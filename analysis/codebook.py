@@ -31,6 +31,11 @@ class Codebook:
     familiarity: tuple[str, ...] = FAMILIARITY
     title: str = ""
 
+    @property
+    def near_to_far(self) -> bool:
+        """Whether the framings are known ones, in order of distance."""
+        return self.framings == tuple(name for name in KNOWN_FRAMINGS if name in self.framings)
+
     def framing_label(self, name: str) -> str:
         return self.labels.get(("framing", name), name)
 

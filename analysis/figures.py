@@ -98,27 +98,45 @@ def _mark(figure: Figure) -> None:
     )
 
 
-def _panels(count: int, columns: int, height_in: float, width_in: float = WIDTH_IN, **share: object) -> tuple[Figure, list[Axes]]:
+def _panels(
+    count: int, columns: int, height_in: float, width_in: float = WIDTH_IN, below_in: float = 0, **share: object
+) -> tuple[Figure, list[Axes]]:
+    """A figure with so many panels of that height, and room below them for a key."""
     columns = min(columns, count)
     rows = -(-count // columns)
-    figure = Figure(figsize=(width_in, rows * height_in), layout="constrained")
+    figure = Figure(figsize=(width_in, rows * height_in + below_in), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **share).ravel()
     for spare in axes[count:]:
         spare.remove()
     return figure, list(axes[:count])
 
 
-def _wrapped(label: str, width: int = 20, most: int = 3) -> str:
+def _cut(label: str, width: int) -> str:
+    return label if len(label) <= width else f"{label[: width - 1].rstrip()}…"
+
+
+def _wrapped(label: str, width: int = 20, most: int = 2) -> str:
+    """The label on at most so many lines."""
     lines = textwrap.wrap(label.replace("_", "_\u200b"), width, break_long_words=True) or [label]
     lines = [line.replace("\u200b", "") for line in lines]
     return "\n".join(lines[:most]) + ("…" if len(lines) > most else "")
 
 
+def _row_in(labels: Sequence[str]) -> float:
+    """The height in inches that a row needs for the tallest of its wrapped labels."""
+    return 0.25 if all("\n" not in label for label in labels) else 0.32
+
+
 def _bars(
-    values: Mapping[str, Mapping[str, float]], titles: Mapping[str, str], labels: Mapping[str, str], axis: str, digits: int
+    values: Mapping[str, Mapping[str, float]],
+    titles: Mapping[str, tuple[str, str]],
+    labels: Mapping[str, str],
+    axis: str,
+    digits: int,
 ) -> Figure:
     """One panel a framing, one bar a technique; a technique without a value there gets no bar and says so."""
-    figure, panels = _panels(len(values), 3, 0.75 + 0.27 * len(labels), sharex=True, sharey=True)
+    rows = [_wrapped(label) for label in labels.values()]
+    figure, panels = _panels(len(values), 3, 0.5 + _row_in(rows) * len(rows), below_in=0.3, sharex=True, sharey=True)
     top = max((value for one in values.values() for value in one.values()), default=0) or 1
     for ax, (framing, one) in zip(panels, values.items(), strict=True):
         for place, technique in enumerate(labels):
@@ -128,11 +146,12 @@ def _bars(
             else:
                 ax.barh(place, value, height=0.66, color=BLUE)
                 _value(ax, value, place, f"{value:.{digits}f}")
-        ax.set_title(titles[framing], loc="left")
-        ax.set_xlim(0, top * 1.2)
+        label, note = titles[framing]
+        ax.set_title(f"{_cut(label, 14)} ({note})", loc="left")
+        ax.set_xlim(0, top * 1.25)
         ax.xaxis.set_major_locator(MaxNLocator(4, integer=digits == 0))
         ax.grid(axis="x")
-        ax.set_yticks(range(len(labels)), [_wrapped(label) for label in labels.values()])
+        ax.set_yticks(range(len(rows)), rows)
         ax.set_ylim(len(labels) - 0.5, -0.5)
         ax.tick_params(labelbottom=True)
     figure.supxlabel(axis, size=8)
@@ -159,7 +178,7 @@ def _familiarity(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], line: tallies.Trend | None) -> Figure:
+def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], axis: str, line: tallies.Trend | None) -> Figure:
     figure, (ax,) = _panels(1, 1, 2.7, NARROW_IN)
     distance = np.arange(1, len(table) + 1)
     if line is not None:
@@ -172,13 +191,13 @@ def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], line: tallies
         below = line is not None and total < line.intercept + line.slope * x
         place = {"xytext": (0, -8 if below else 7), "textcoords": "offset points", "va": "top" if below else "bottom"}
         ax.annotate(f"{total}", (x, total), ha="center", size=7.5, **place)
-    ax.set_xticks(distance, [_wrapped(label, 16) for label in labels])
+    ax.set_xticks(distance, [_wrapped(label, max(6, min(16, 54 // len(labels)))) for label in labels])
     ax.set_xlim(0.6, len(table) + 0.4)
     ax.set_ylim(0, max(table.total.max(), 1) * 1.18)
     ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     ax.grid(axis="y")
     ax.set_ylabel("points")
-    ax.set_xlabel("framing, from near to far" if len(table) > 1 else "framing")
+    ax.set_xlabel(axis)
     ax.legend(loc="lower left")
     return figure
 
@@ -188,8 +207,9 @@ def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
     techniques = list(dict.fromkeys(table.technique))
     shares = 100 * table[list(tallies.DISTRIBUTION)].to_numpy() / table.n.to_numpy()[:, None]
     starts = -(shares[:, 0] + shares[:, 1] + shares[:, 2] / 2)
-    opponents = table.groupby("technique").size().max()
-    figure, panels = _panels(len(techniques), 2, 0.62 + 0.25 * opponents, sharex=True)
+    opponents = {name: _wrapped(codebook.label(name)) for name in techniques}
+    most = table.groupby("technique").size().max()
+    figure, panels = _panels(len(techniques), 2, 0.5 + _row_in(list(opponents.values())) * most, below_in=0.5, sharex=True)
     for ax, technique in zip(panels, techniques, strict=True):
         rows = table.technique == technique
         about, share = table[rows], shares[rows]
@@ -205,8 +225,8 @@ def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
                     )
             left = left + share[:, answer]
         ax.axvline(0, color=INK, linewidth=0.7, zorder=0)
-        ax.set_title(codebook.label(technique), loc="left")
-        ax.set_yticks(range(len(about)), [_wrapped(codebook.label(name)) for name in about.opponent])
+        ax.set_title(_cut(codebook.label(technique), 30), loc="left")
+        ax.set_yticks(range(len(about)), [opponents[name] for name in about.opponent])
         ax.set_ylim(len(about) - 0.5, -0.5)
         ax.set_xlim(-100, 100)
         ax.xaxis.set_major_locator(MultipleLocator(50))
@@ -295,7 +315,7 @@ def draw_responses(
             ),
             _bars,
             points,
-            {name: f"{codebook.framing_label(name)} ({total[name]})" for name in points},
+            {name: (codebook.framing_label(name), f"{total[name]}") for name in points},
             labels,
             "points (total of the framing in brackets)",
             0,
@@ -331,6 +351,7 @@ def draw_responses(
             _total_by_distance,
             totals,
             framings,
+            "framing, from near to far" if codebook.near_to_far else "framing",
             line,
             simulated=simulated,
         )
@@ -392,7 +413,7 @@ def draw_priorities(
     """AHP priorities, one panel a framing. shares: framing -> technique -> priority."""
     used = [name for name in codebook.techniques if any(name in one for one in shares.values())]
     titles = {
-        framing: f"{codebook.framing_label(framing)} (" + ("no CR" if one.cr is None else f"CR {one.cr:z.3f}") + ")"
+        framing: (codebook.framing_label(framing), "no CR" if one.cr is None else f"CR {one.cr:z.3f}")
         for framing, one in found.items()
     }
     return _picture(
@@ -400,7 +421,7 @@ def draw_priorities(
         "AHP priorities per framing",
         "Principal eigenvector of the matrix of judgements, scaled to sum 1 (thesis, table 5.2), with the consistency ratio.",
         "; ".join(
-            f"{titles[framing]}: " + ", ".join(f"{codebook.label(name)} {share:.3f}" for name, share in one.items())
+            f"{' '.join(titles[framing])}: " + ", ".join(f"{codebook.label(name)} {share:.3f}" for name, share in one.items())
             for framing, one in shares.items()
         ),
         _bars,

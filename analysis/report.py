@@ -67,11 +67,11 @@ def report_responses(responses: Responses, pair: tuple[str, str] | None = None, 
         simulated=responses.simulated,
         summary=_summary(responses, scores, totals, sides, comparisons, found, pair),
         counts=[
-            ("participants", responses.participants),
-            ("answers", len(responses.frame)),
-            ("techniques", len({name for items in responses.items.values() for name in items})),
-            ("framings", len(responses.items)),
-            ("rows not used", len(responses.findings)),
+            ("participant", responses.participants),
+            ("answer", len(responses.frame)),
+            ("technique", len({name for items in responses.items.values() for name in items})),
+            ("framing", len(responses.items)),
+            ("unused row", len(responses.findings)),
         ],
         scores=_crossed(scores, "score", codebook, list(responses.items)),
         totals=[
@@ -116,7 +116,7 @@ def report_matrices(comparisons: Mapping[str, Comparison], source: str = "", com
             f"{max(share.values()):.3f}. {_coherence(found[name])}"
             for name, share in shares.items()
         ],
-        counts=[("techniques", len(items)), ("framings", len(comparisons))],
+        counts=[("technique", len(items)), ("framing", len(comparisons))],
         matrices=_matrices(comparisons, found, codebook),
         priorities=_crossed(table, "priority", codebook, list(comparisons)),
         rule="The matrices were given; nothing was counted here.",
@@ -280,9 +280,9 @@ def _summary(
                 shares = dict(zip(comparisons[framing].items, found[framing].vector, strict=True))
                 top = _first(shares, codebook)
                 if len(top) == len(shares):
-                words += " The AHP priorities put none before another."
-            else:
-                words += f" The AHP priorities put {_listed(top)} first{' too' if top == best else ''}."
+                    words += " The AHP priorities put none before another."
+                else:
+                    words += f" The AHP priorities put {_listed(top)} first{' too' if top == best else ''}."
         if framing in found:
             words += f" {_coherence(found[framing])}"
         elif comparisons[framing].missing:
@@ -296,7 +296,8 @@ def _summary(
         values = ", ".join(
             f"{row.mean_strength:.2f} ({codebook.framing_label(row.framing)})" for row in totals.itertuples()
         )
-        sentences.append(f"From near to far, preferences {way}: on average an answer gave {values} points, of at most 2.")
+        path = "From near to far" if codebook.near_to_far else "From framing to framing"
+        sentences.append(f"{path}, preferences {way}: on average an answer gave {values} points, of at most 2.")
     a, b = (codebook.label(name) for name in pair)
     values = "; ".join(
         f"{codebook.framing_label(framing)} {(one < 0).sum()}, {(one == 0).sum()} and {(one > 0).sum()}"
@@ -309,7 +310,7 @@ def _summary(
     )
     sentences.append(
         f"Over all answers the image on the left was preferred {sides.left.sum()} times, the one on the right "
-        f"{sides.right.sum()} times; {sides.none.sum()} answers saw no difference."
+        f"{sides.right.sum()} times; no difference was seen {sides.none.sum()} times."
     )
     sentences.append(
         "These are counts of these answers. No test was made of whether other people would answer alike, "
