@@ -6,6 +6,7 @@ a study must not differ from the scan without anybody being told.
 """
 
 import hashlib
+import os
 import warnings
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -73,7 +74,7 @@ class Source:
         """Where a file lies that the scan names: as it says, or, for a path of another machine, beside the scan."""
         plain = name.replace("\\", "/")
         places = (self.path.parent / plain, self.path.parent / plain.rpartition("/")[2])
-        return next((place for place in places if place.is_file()), None)
+        return next((place for place in places if os.path.isfile(place)), None)
 
     def beside(self, name: str, what: str) -> bytes:
         """A file that the scan names."""

@@ -107,10 +107,11 @@ class _Lines:
                 return values.reshape(-1, width)
         except ValueError:
             pass
-        usual = len(self.rest(lines[0], word).split())
-        for line in lines:  # once something is wrong, find where
+        usual = len(self.rest(lines[0], word).split())  # now that something is wrong, find where
+        for line in lines:
             found = self.rest(line, word)
-            if len(found.split()) != usual or usual not in WIDTHS[word] or not all(map(_is_number, found.split())):
+            values = re.split(" +", found)
+            if len(values) != usual or usual not in WIDTHS[word] or not all(map(_is_number, values)):
                 break
         wanted = " or ".join(map(str, WIDTHS[word]))
         raise self.source.error(
@@ -173,11 +174,7 @@ class _Lines:
 
 
 def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?|[-+]?(nan|inf(inity)?)", text, re.ASCII | re.IGNORECASE) is not None
 
 
 def _library(source: Source, lines: _Lines) -> dict[str, Material]:
@@ -212,7 +209,7 @@ def _property(source: Source, images: dict[str, np.ndarray], word: str, rest: st
             raise source.error(f"its material library has the colour {f'Kd {rest}'!r}; expected three numbers from 0 to 1")
         return {"base_colour": colour * (3 // len(colour))}
     if word == "pr":
-        return {"roughness_factor": min(max(float(rest), 0.0), 1.0)} if _is_number(rest) else {}
+        return {"roughness_factor": float(rest)} if _is_number(rest) and 0 <= float(rest) <= 1 else {}
     if word not in ("map_kd", "map_pr", "norm", "map_kn", "map_bump", "bump"):
         return {}
     name = _texture_name(source, rest)
