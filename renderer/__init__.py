@@ -6,6 +6,12 @@ Importing this package does not touch OpenGL: names resolve on first use.
 from __future__ import annotations
 
 import importlib
+import os
+import sys
+
+if sys.platform == "linux":
+    # pyrender imports pyglet for its viewer, which would look for an X server's libraries.
+    os.environ.setdefault("PYGLET_HEADLESS", "true")
 
 VERSION = "0.1.0"
 _WHERE = {"Renderer": "renderer.frame", "TECHNIQUES": "renderer.techniques", "make": "renderer.techniques",

@@ -69,3 +69,12 @@ def test_application_never_imports_opengl():
     modules = set(run.stdout.split())
     assert "flask" in modules
     assert not modules & {"OpenGL", "pyrender", "pyglet", "renderer"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="EGL and OSMesa are Linux's")
+def test_renderer_needs_no_x_server():
+    """pyrender's viewer, which is imported with it, must not look for the libraries of a screen."""
+    program = "import sys, renderer.scene; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    modules = set(run.stdout.split())
+    assert "pyrender.viewer" in modules and not any(name.startswith("pyglet.libs.x11") for name in modules)
