@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from alembic import command
 from alembic.config import Config
+from alembic.util import CommandError
 from sqlalchemy import Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError, DatabaseError, NoSuchModuleError
 from sqlalchemy.orm import Session
@@ -45,6 +46,8 @@ class Database:
             raise InputError(f"--database: expected an SQLAlchemy URL such as sqlite:////data/study.sqlite3, got {url!r} ({error})") from None
         except DatabaseError as error:
             raise InputError(f"{shown}: cannot be opened as a database ({str(error.orig).splitlines()[0]})") from None
+        except CommandError as error:
+            raise InputError(f"{shown}: its schema is not one of this version of subdermal ({error})") from None
         database = cls(engine)
         database._claim(study, "simulated" if simulated else "real", shown)
         return database

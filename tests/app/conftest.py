@@ -1,0 +1,149 @@
+"""A study of ready-made images, its application, and people who use it as a browser without scripts does."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from sqlalchemy import select
+
+from app import create_app
+from app.models import Participant, Response
+
+FRAMINGS = ("close-up", "head-shot", "half-length")
+TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
+
+
+@pytest.fixture
+def write_study():
+    """Write a study folder by hand, no renderer: 15 small PNGs and their manifest; `changes` replace keys of the study."""
+
+    def write(directory: Path, size: tuple[int, int] = (64, 36), **changes) -> Path:
+        (directory / "images").mkdir(parents=True)
+        images = []
+        for f, framing in enumerate(FRAMINGS):
+            for t, technique in enumerate(TECHNIQUES):
+                file = f"images/{framing}_{technique}.png"
+                colour = (60 + 40 * t, 90, 60 + 60 * f)
+                Image.fromarray(np.full((size[1], size[0], 3), colour, np.uint8)).save(directory / file)
+                digest = hashlib.sha256((directory / file).read_bytes()).hexdigest()
+                images.append({"framing": framing, "technique": technique, "file": file, "width": size[0], "height": size[1], "sha256": digest})
+        study = {
+            "name": "ready-made",
+            "title": "Which one?",
+            "version": 1,
+            "seed": 7,
+            "framings": [{"name": name, "label": f"at {name}"} for name in FRAMINGS],
+            "techniques": [{"name": name, "label": f"by {name}"} for name in TECHNIQUES],
+        }
+        manifest = {"format": "subdermal-manifest/1", "study": study | changes, "images": images}
+        (directory / "manifest.json").write_text(json.dumps(manifest))
+        return directory
+
+    return write
+
+
+@pytest.fixture
+def study_dir(tmp_path, write_study):
+    return write_study(tmp_path / "study")
+
+
+@pytest.fixture
+def app(study_dir):
+    return create_app(study_dir)
+
+
+@pytest.fixture
+def person(app):
+    """A new person with a browser of their own: `person()`."""
+    return lambda: Person(app)
+
+
+@pytest.fixture
+def experimenter(app):
+    """A browser that is logged in to the dashboard."""
+    from app.dashboard import password
+
+    visitor = Person(app)
+    visitor.get("/dashboard/login")
+    visitor.send("password", password=password.reset(app.extensions["database"]))
+    assert visitor.path == "/dashboard/"
+    return visitor
+
+
+class Person:
+    """Gets pages and sends the forms that are on them; holds the last page."""
+
+    def __init__(self, app):
+        self.app, self.http = app, app.test_client()
+        self.page = None
+
+    @property
+    def path(self) -> str:
+        return self.page.request.path
+
+    def get(self, path: str):
+        self.page = self.http.get(path, follow_redirects=True)
+        return self.page
+
+    def form(self, field: str) -> dict[str, str]:
+        """The fields of the form on the page that has `field`, as a browser would send them before anything is chosen."""
+        return next(fields for _, fields in forms(self.page.text) if field in fields)
+
+    def send(self, field: str, **filled):
+        """Fill in and send the form that has `field`."""
+        action, fields = next((action, fields) for action, fields in forms(self.page.text) if field in fields)
+        data = fields | {name: str(value) for name, value in filled.items()}
+        self.page = self.http.post(action or self.path, data=data, follow_redirects=True)
+        return self.page
+
+    def begin(self, familiarity: int = 3) -> Person:
+        self.get("/")
+        self.send("consent", consent="yes")
+        self.send("familiarity", familiarity=familiarity)
+        assert self.path == "/question"
+        return self
+
+    def answer(self, *values: int) -> Person:
+        for value in values:
+            self.send("trial", answer=value, rt_ms=1234)
+        return self
+
+    @property
+    def rows(self) -> list[Response]:
+        """The answers of this browser's participant that are in the database, in their order."""
+        with self.http.session_transaction() as session:
+            visit = session["visit"]
+        with self.app.extensions["database"].read() as db:
+            query = select(Response).join(Participant).where(Participant.visit == visit).order_by(Response.id)
+            return list(db.scalars(query))
+
+    @property
+    def answers(self) -> list[int]:
+        return [row.answer for row in self.rows]
+
+
+class _Forms(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.forms: list[tuple[str, dict[str, str]]] = []
+
+    def handle_starttag(self, tag, attrs):
+        attributes = dict(attrs)
+        if tag == "form":
+            self.forms.append((attributes.get("action", ""), {}))
+        elif tag == "input" and self.forms and "name" in attributes:
+            chosen = attributes.get("type") not in ("radio", "checkbox")
+            self.forms[-1][1].setdefault(attributes["name"], attributes.get("value", "") if chosen else "")
+
+
+def forms(html: str) -> list[tuple[str, dict[str, str]]]:
+    """(action, fields) of every form of a page."""
+    parser = _Forms()
+    parser.feed(html)
+    return parser.forms

@@ -1,0 +1,144 @@
+"""What the experimenter sees and downloads."""
+
+import csv
+import io
+from datetime import timedelta
+
+import pytest
+from sqlalchemy import func, select
+
+from analysis.responses import read_responses
+from app.models import Event, Participant, Response, Trial, now
+
+
+def table(response):
+    return list(csv.DictReader(io.StringIO(response.text)))
+
+
+def withdraw(somebody):
+    somebody.get("/withdraw")
+    form = somebody.form("csrf_token")
+    somebody.http.post("/withdraw", data={"csrf_token": form["csrf_token"]})
+
+
+def test_the_export_has_one_row_for_each_answer(person, experimenter, app):
+    person().begin(familiarity=5).answer(*[1, -2, 0] * 10)
+    person().begin(familiarity=1).answer(2, 2)
+    response = experimenter.get("/dashboard/responses.csv")
+    rows = table(response)
+    assert len(rows) == 32 == int(response.headers["X-Row-Count"])
+    with app.extensions["database"].read() as db:
+        expected = db.execute(
+            select(Trial.framing, Trial.left, Trial.right, Trial.order, Response.answer).join(Response).order_by(Trial.participant_id, Trial.order)
+        ).all()
+    assert [(r["framing"], r["left"], r["right"], int(r["order"]), int(r["answer"])) for r in rows] == [tuple(row) for row in expected]
+    assert [(r["participant"], r["familiarity"], r["completed"], r["simulated"]) for r in (rows[0], rows[-1])] == [
+        ("P0001", "5", "1", "0"),
+        ("P0002", "1", "0", "0"),
+    ]
+
+
+def test_every_answer_names_the_images_that_were_shown(person, experimenter, app):
+    person().begin().answer(1)
+    row = table(experimenter.get("/dashboard/responses.csv"))[0]
+    study = app.extensions["study"]
+    for side in ("left", "right"):
+        image = study.images_by_sha256[row[f"image_{side}_sha256"]]
+        assert (image.framing, image.technique) == (row["framing"], row[side])
+
+
+def test_the_export_is_what_the_analysis_reads(person, experimenter, tmp_path):
+    person().begin().answer(*[1, -2, 0] * 10)
+    (tmp_path / "responses.csv").write_bytes(experimenter.get("/dashboard/responses.csv").data)
+    responses = read_responses(tmp_path / "responses.csv")
+    assert len(responses.frame) == 30 and not responses.findings and not responses.simulated
+
+
+def test_withdrawn_answers_are_not_exported_nor_counted(person, experimenter):
+    person().begin().answer(1, 1, 1)
+    leaver = person().begin().answer(2, 2)
+    withdraw(leaver)
+    assert {row["participant"] for row in table(experimenter.get("/dashboard/responses.csv"))} == {"P0001"}
+    live = experimenter.get("/dashboard/live.json").json
+    assert live["summary"]["answers"] == 3 and live["summary"]["withdrawn"] == 1
+    assert sum(framing["answers"] for framing in live["framings"]) == 3
+    assert sum(given["count"] for given in live["sides"]["given"]) == 3
+    assert sum(side["left"] for side in live["sides"]["shown"]) == 3
+
+
+def test_the_codebook_describes_exactly_the_columns(person, experimenter):
+    person().begin().answer(1)
+    columns = list(table(experimenter.get("/dashboard/responses.csv"))[0])
+    codebook = table(experimenter.get("/dashboard/codebook.csv"))
+    assert [row["column"] for row in codebook] == columns
+    assert all(row["description"] and row["type"] for row in codebook)
+    text = experimenter.get("/dashboard/codebook.md").text
+    for word in (*(f"| `{column}` |" for column in columns), "by golubev_plus", "at half-length", "A, clearly", "No familiarity"):
+        assert word in text
+
+
+def test_an_empty_study_has_an_empty_table_and_a_calm_dashboard(experimenter):
+    response = experimenter.get("/dashboard/responses.csv")
+    assert table(response) == [] and response.text.startswith("participant,") and response.headers["X-Row-Count"] == "0"
+    assert "No answers yet" in experimenter.get("/dashboard/").text
+
+
+def test_live_numbers_follow_the_answers(person, experimenter, app):
+    somebody = person().begin()
+    before = experimenter.get("/dashboard/live.json").json
+    assert (before["summary"]["started"], before["summary"]["answers"], before["framings"]) == (1, 0, [])
+    somebody.answer(2)
+    after = experimenter.get("/dashboard/live.json").json
+    with app.extensions["database"].read() as db:
+        trial = db.scalars(select(Trial).order_by(Trial.order)).first()
+    (framing,) = after["framings"]
+    assert framing["name"] == trial.framing and framing["total"] == 2 and framing["cr"] is None
+    assert {t["name"]: t["score"] for t in framing["techniques"]} == {trial.right: 2, trial.left: 0}
+    assert after["participants"][0]["answered"] == 1 and "at " + trial.framing in after["html"]
+
+
+def test_priorities_appear_when_every_pair_is_answered(person, experimenter):
+    """Equal judgements everywhere have equal priorities and a consistency ratio of 0."""
+    person().begin().answer(*[0] * 30)
+    for framing in experimenter.get("/dashboard/live.json").json["framings"]:
+        assert [t["priority"] for t in framing["techniques"]] == pytest.approx([0.2] * 5)
+        assert framing["cr"] == pytest.approx(0, abs=1e-12)
+
+
+def test_states_of_participants(person, experimenter, app):
+    for answers in (30, 2, 2, 2):
+        person().begin().answer(*[0] * answers)
+    with app.extensions["database"].write() as db:
+        db.get(Participant, 3).withdrawn_at = now()
+        for row in db.scalars(select(Response).where(Response.participant_id == 4)):
+            row.answered_at -= timedelta(hours=1)
+    live = experimenter.get("/dashboard/live.json").json
+    assert [p["state"] for p in live["participants"]] == ["dropped out", "withdrawn", "in progress", "completed"]
+
+
+def test_the_report_is_served_behind_the_login_with_its_own_policy(person, experimenter, study_dir):
+    assert experimenter.get("/dashboard/report/").status_code == 404
+    (study_dir / "report").mkdir()
+    (study_dir / "report" / "report.html").write_text("<title>Report</title><style>p { color: red }</style>")
+    response = experimenter.get("/dashboard/report/")
+    assert "<title>Report" in response.text and "style-src 'unsafe-inline'" in response.headers["Content-Security-Policy"]
+    assert "script-src" not in response.headers["Content-Security-Policy"]
+    assert 'href="/dashboard/report/"' in experimenter.get("/dashboard/").text
+    assert experimenter.get("/dashboard/report/../../study.sqlite3").status_code == 404
+    stranger = person()
+    stranger.get("/dashboard/report/")
+    assert stranger.path == "/dashboard/login"
+
+
+def test_the_dashboard_links_every_image_by_its_hash(experimenter, app):
+    text = experimenter.get("/dashboard/").text
+    for sha256 in app.extensions["study"].images_by_sha256:
+        assert f'href="/images/{sha256}"' in text
+
+
+def test_what_happened_is_kept_as_events(person, app):
+    somebody = person().begin().answer(*[1] * 30)
+    withdraw(somebody)
+    with app.extensions["database"].read() as db:
+        counts = dict(db.execute(select(Event.kind, func.count()).group_by(Event.kind)).all())
+    assert counts == {"consented": 1, "rated": 1, "shown": 30, "completed": 1, "withdrew": 1}

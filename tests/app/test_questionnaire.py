@@ -1,0 +1,248 @@
+"""What a participant can do, and what must not happen: a lost, doubled or overwritten answer."""
+
+import re
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from sqlalchemy import select
+
+from app.models import Event, Participant, Trial
+from stimuli.design import trials
+
+
+def test_thirty_answers_from_consent_to_code(person):
+    somebody = person().begin(familiarity=4)
+    values = [(i % 5) - 2 for i in range(30)]
+    for done, value in enumerate(values):
+        assert f"Question {done + 1} <span>of 30" in somebody.page.text
+        somebody.answer(value)
+        assert len(somebody.rows) == done + 1  # committed before the next page is sent
+    assert somebody.path == "/thanks"
+    assert re.search(r'id="completion-code">[A-Z2-9]{10}<', somebody.page.text)
+    assert somebody.answers == values
+
+
+def test_trials_are_those_of_the_design_and_recorded(app, person):
+    person().begin(), person().begin()
+    study = app.extensions["study"]
+    with app.extensions["database"].read() as db:
+        for number in (1, 2):
+            recorded = db.scalars(select(Trial).where(Trial.participant_id == number).order_by(Trial.order)).all()
+            expected = trials(study.framings, study.techniques, study.seed, number)
+            assert [(t.order, t.framing, t.left, t.right) for t in recorded] == [(t.order, t.framing, t.left, t.right) for t in expected]
+            assert {t.seed for t in recorded} == {f"7/{number}"}
+
+
+def test_the_page_does_not_tell_which_technique_is_shown(app, person):
+    somebody = person().begin()
+    text = somebody.page.text
+    for name in app.extensions["study"].techniques:
+        assert f"by {name}" not in text and (name == "none" or name not in text)
+    assert text.count("/images/") == 4  # two shown, two fetched beforehand
+
+
+def test_what_the_browser_measured_is_recorded(person):
+    somebody = person().begin()
+    somebody.send("trial", answer=1, rt_ms=4321, viewport_width=1280, viewport_height=720, device_pixel_ratio=1.25, shown_width=630.5, shown_height=354.66)
+    row = somebody.rows[0]
+    assert (row.rt_ms, row.timed_by, row.times_shown) == (4321, "browser", 1)
+    assert (row.viewport_width, row.viewport_height, row.device_pixel_ratio, row.shown_width, row.shown_height) == (1280, 720, 1.25, 630.5, 354.66)
+
+
+def test_without_scripts_the_server_takes_the_time(person):
+    somebody = person().begin()
+    somebody.send("trial", answer=1)
+    row = somebody.rows[0]
+    assert row.timed_by == "server" and row.viewport_width is None
+    assert row.rt_ms == round((row.answered_at - row.started_at).total_seconds() * 1000)
+
+
+@pytest.mark.parametrize("nonsense", ["", "-1", "1e400", "nan", "inf", "9" * 40, "<b>"])
+def test_a_nonsense_measurement_never_costs_the_answer(person, nonsense):
+    somebody = person().begin()
+    somebody.send("trial", answer=-1, rt_ms=nonsense, viewport_width=nonsense, device_pixel_ratio=nonsense, shown_width=nonsense)
+    row = somebody.rows[0]
+    assert (row.answer, row.timed_by, row.viewport_width, row.device_pixel_ratio, row.shown_width) == (-1, "server", None, None, None)
+
+
+def test_reload_resumes_where_it_was(person):
+    somebody = person().begin().answer(1, -2)
+    trial = somebody.form("trial")["trial"]
+    somebody.get("/question")
+    somebody.get("/question")
+    assert "Question 3 <span>" in somebody.page.text and somebody.form("trial")["trial"] == trial
+    somebody.answer(0)
+    assert [row.times_shown for row in somebody.rows] == [1, 1, 3]
+    somebody.get("/")
+    assert "3 of 30 questions are answered" in somebody.page.text
+
+
+@pytest.mark.parametrize("path", ["/question", "/familiarity", "/thanks", "/withdrawn"])
+def test_every_address_leads_to_the_page_that_is_due(person, path):
+    newcomer = person()
+    newcomer.get(path)
+    assert newcomer.path == "/"
+    somebody = person().begin()
+    somebody.get(path)
+    assert somebody.path == "/question"
+
+
+def test_the_same_answer_twice_is_one_answer(person):
+    somebody = person().begin()
+    first = somebody.form("trial") | {"answer": "2"}
+    for _ in range(2):
+        somebody.page = somebody.http.post("/question", data=first, follow_redirects=True)
+    assert somebody.answers == [2] and "Question 2 <span>" in somebody.page.text
+    reply = somebody.http.post("/question", data=first, headers={"Accept": "application/json"})
+    assert (reply.status_code, reply.json) == (200, {"outcome": "repeated", "next": "/question"})
+
+
+def test_going_back_cannot_change_an_answer(app, person):
+    somebody = person().begin()
+    first = somebody.form("trial")
+    somebody.answer(2)
+    somebody.page = somebody.http.post("/question", data=first | {"answer": "-2"}, follow_redirects=True)
+    assert somebody.answers == [2] and "the first answer was kept" in somebody.page.text
+    reply = somebody.http.post("/question", data=first | {"answer": "-1"}, headers={"Accept": "application/json"})
+    assert (reply.status_code, reply.json["outcome"]) == (409, "refused")
+    with app.extensions["database"].read() as db:
+        details = db.scalars(select(Event.detail).where(Event.kind == "refused").order_by(Event.id)).all()
+    assert details == ["kept 2, refused -2", "kept 2, refused -1"]
+
+
+def test_only_the_current_question_of_ones_own_can_be_answered(app, person):
+    one, two = person().begin(), person().begin()
+    form = one.form("trial")
+    with app.extensions["database"].read() as db:
+        ids = {owner: db.scalars(select(Trial.id).where(Trial.participant_id == owner).order_by(Trial.order)).all() for owner in (1, 2)}
+    for trial in (ids[1][1], ids[2][0], 10**6):
+        reply = one.http.post("/question", data=form | {"trial": trial, "answer": 1}, headers={"Accept": "application/json"})
+        assert (reply.status_code, reply.json["outcome"]) == (409, "stale")
+    assert one.answers == [] and two.answers == []
+
+
+def test_an_answer_about_other_images_is_not_taken(person):
+    somebody = person().begin()
+    form = somebody.form("trial")
+    somebody.send("trial", answer=1, image_left=form["image_right"], image_right=form["image_left"])
+    assert somebody.answers == [] and "not the current question" in somebody.page.text
+
+
+def test_a_question_that_was_never_shown_cannot_be_answered(person):
+    somebody = person()
+    somebody.get("/")
+    token = somebody.form("consent")["csrf_token"]
+    somebody.http.post("/", data={"csrf_token": token, "consent": "yes"})
+    somebody.http.post("/familiarity", data={"csrf_token": token, "familiarity": "2"})
+    reply = somebody.http.post("/question", data={"csrf_token": token, "trial": 1, "answer": 1}, headers={"Accept": "application/json"})
+    assert (reply.status_code, reply.json["outcome"]) == (409, "stale")
+
+
+@pytest.mark.parametrize("answer", ["", "3", "-3", "1.5", "A", "--1"])
+def test_an_answer_outside_the_scale_is_not_taken(person, answer):
+    somebody = person().begin()
+    form = somebody.form("trial") | {"answer": answer}
+    assert somebody.http.post("/question", data=form, headers={"Accept": "application/json"}).status_code == 400
+    somebody.send("trial", answer=answer)
+    assert somebody.answers == [] and "choose one of the five answers" in somebody.page.text
+
+
+def test_consent_clicked_twice_is_one_participant(app, person):
+    somebody = person()
+    somebody.get("/")
+    form = somebody.form("consent") | {"consent": "yes"}
+    for _ in range(2):
+        somebody.http.post("/", data=form)
+    with app.extensions["database"].read() as db:
+        assert len(db.scalars(select(Participant)).all()) == 1
+
+
+def test_no_consent_no_participant(app, person):
+    somebody = person()
+    somebody.get("/")
+    somebody.send("consent")
+    assert "tick the box" in somebody.page.text
+    with app.extensions["database"].read() as db:
+        assert db.scalars(select(Participant)).all() == []
+
+
+def test_the_first_familiarity_stays(app, person):
+    somebody = person().begin(familiarity=2)
+    token = somebody.form("trial")["csrf_token"]
+    somebody.http.post("/familiarity", data={"csrf_token": token, "familiarity": "5"})
+    with app.extensions["database"].read() as db:
+        assert db.get(Participant, 1).familiarity == 2
+
+
+def test_no_code_before_all_answers(app, person):
+    somebody = person().begin().answer(*[1] * 29)
+    somebody.get("/thanks")
+    assert somebody.path == "/question"
+    with app.extensions["database"].read() as db:
+        assert db.get(Participant, 1).completion_code is None
+    somebody.answer(1)
+    with app.extensions["database"].read() as db:
+        participant = db.get(Participant, 1)
+    assert participant.completion_code in somebody.page.text and participant.completed_at
+    code = participant.completion_code
+    somebody.get("/thanks")
+    somebody.get("/")
+    assert somebody.path == "/thanks" and code in somebody.page.text  # the same code, however often it is looked at
+
+
+def test_withdrawn_answers_stay_in_the_database_and_end_the_questions(person):
+    somebody = person().begin().answer(1, 2)
+    form = somebody.form("trial") | {"answer": "1"}
+    somebody.get("/withdraw")
+    somebody.page = somebody.http.post("/withdraw", data={"csrf_token": somebody.form("csrf_token")["csrf_token"]}, follow_redirects=True)
+    assert somebody.path == "/withdrawn"
+    somebody.get("/question")
+    assert somebody.path == "/withdrawn"
+    assert somebody.http.post("/question", data=form, headers={"Accept": "application/json"}).status_code == 409
+    assert somebody.answers == [1, 2]
+
+
+def test_withdrawing_by_code_from_another_device(app, person):
+    somebody = person().begin().answer(*[0] * 30)
+    code = re.search(r'id="completion-code">(\w+)<', somebody.page.text)[1]
+    elsewhere = person()
+    elsewhere.get("/withdraw")
+    elsewhere.send("code", code="WRONGCODE2")
+    assert "No participant was given this code" in elsewhere.page.text
+    elsewhere.send("code", code=f" {code[:5].lower()}-{code[5:]} ")
+    assert elsewhere.path == "/withdrawn"
+    somebody.get("/thanks")
+    assert somebody.path == "/withdrawn"
+
+
+def test_another_person_on_the_same_device(person):
+    somebody = person().begin().answer(*[0] * 30)
+    somebody.page = somebody.http.post("/another", data={"csrf_token": somebody.form("csrf_token")["csrf_token"]}, follow_redirects=True)
+    assert somebody.path == "/" and "consent" in somebody.form("consent")
+    assert somebody.begin().answers == []
+
+
+def test_several_people_at_once_and_one_who_clicks_wildly(app, person):
+    people = [person() for _ in range(6)]
+
+    def take_part(somebody):
+        somebody.begin()
+        for i in range(30):
+            form = somebody.form("trial") | {"answer": str(i % 5 - 2)}
+            with ThreadPoolExecutor(3) as clicks:  # three times the same click, each from a copy of the same browser
+                cookie = somebody.http.get_cookie("subdermal").value
+                list(clicks.map(lambda _: click(app, cookie, form), range(3)))
+            somebody.get("/question")
+        return somebody.answers
+
+    with ThreadPoolExecutor(len(people)) as pool:
+        results = list(pool.map(take_part, people))
+    assert results == [[i % 5 - 2 for i in range(30)]] * len(people)
+    assert all(somebody.path == "/thanks" for somebody in people)
+
+
+def click(app, cookie, form):
+    browser = app.test_client()
+    browser.set_cookie("subdermal", cookie)
+    reply = browser.post("/question", data=form, headers={"Accept": "application/json"})
+    assert reply.status_code == 200 and reply.json["outcome"] in ("recorded", "repeated")

@@ -1,0 +1,222 @@
+"""What strangers and hostile input must not achieve."""
+
+import re
+
+import pytest
+from sqlalchemy import select
+
+from app import create_app
+from app.dashboard import password
+from app.models import StudyRecord
+from app.security import Limiter
+
+POSTS = ["/", "/familiarity", "/question", "/withdraw", "/another", "/dashboard/login", "/dashboard/logout", "/simulation/"]
+CLOSED = ["/dashboard/", "/dashboard/live.json", "/dashboard/responses.csv", "/dashboard/codebook.csv", "/dashboard/codebook.md", "/dashboard/report/", "/dashboard/report/report.html"]
+
+
+def addresses(app, method):
+    """An address for every rule of the application that takes the method."""
+    for rule in app.url_map.iter_rules():
+        if method in rule.methods:
+            values = {"sha256": next(iter(app.extensions["study"].images_by_sha256)), "filename": "style.css", "name": "report.html"}
+            with app.test_request_context():
+                from flask import url_for
+
+                yield url_for(rule.endpoint, **{name: values[name] for name in rule.arguments})
+
+
+@pytest.fixture
+def twin(study_dir):
+    """The application over simulated answers, which has every rule of the real one and a few of its own."""
+    return create_app(study_dir, simulated=True)
+
+
+def test_the_lists_above_are_complete(twin):
+    assert set(addresses(twin, "POST")) == set(POSTS)
+    open_to_all = {"/", "/familiarity", "/question", "/thanks", "/withdraw", "/withdrawn", "/study.css", "/dashboard/login", "/simulation/", "/simulation/status.json"}
+    rest = {path for path in addresses(twin, "GET") if not path.startswith(("/images/", "/static/"))}
+    assert rest == set(CLOSED) | open_to_all
+
+
+@pytest.mark.parametrize("path", POSTS)
+def test_no_post_without_a_token(twin, path):
+    for data in ({}, {"csrf_token": "nonsense"}, {"consent": "yes", "trial": 1, "answer": 1, "password": "x"}):
+        assert twin.test_client().post(path, data=data).status_code == 400
+
+
+def test_a_token_of_another_browser_is_refused(person):
+    one, two = person().begin(), person().begin()
+    form = one.form("trial") | {"answer": "1", "csrf_token": two.form("trial")["csrf_token"]}
+    reply = one.http.post("/question", data=form)
+    assert reply.status_code == 400 and "reload" in reply.text and one.answers == []
+
+
+@pytest.mark.parametrize("path", CLOSED)
+def test_the_dashboard_is_closed_to_strangers(app, path):
+    assert app.test_client().get(path).headers["Location"] == "/dashboard/login"
+    assert app.test_client().get(path, headers={"Accept": "application/json"}).status_code == 401
+
+
+@pytest.mark.parametrize("logged_in", [False, True])
+def test_headers_on_every_page(twin, logged_in):
+    http = twin.test_client()
+    if logged_in:
+        secret = password.reset(twin.extensions["database"])
+        token = re.search(r'name="csrf_token" value="([^"]+)"', http.get("/dashboard/login").text)[1]
+        assert http.post("/dashboard/login", data={"csrf_token": token, "password": secret}).status_code == 303
+    for path in [*addresses(twin, "GET"), "/nowhere", "/images/" + "0" * 64]:
+        response = http.get(path)
+        assert response.status_code in (200, 303, 404), path
+        headers = response.headers
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "base-uri 'none'" in policy, path
+        assert "unsafe" not in policy, path
+        assert headers["X-Content-Type-Options"] == "nosniff" and headers["Referrer-Policy"] == "same-origin", path
+        cache = headers["Cache-Control"]
+        assert ("immutable" in cache) == (path.startswith("/images/") and response.status_code == 200), path
+        assert cache == "no-store" or path.startswith(("/images/", "/static/", "/study.css")), path
+
+
+def test_no_page_has_anything_inline(person, experimenter):
+    """What the content policy forbids must not be there either: it would silently not work."""
+    somebody = person()
+    pages = [somebody.get("/").text, somebody.begin().page.text, somebody.get("/withdraw").text, experimenter.get("/dashboard/").text]
+    for page in pages:
+        assert not re.search(r"<style|\sstyle=|\son[a-z]+=|javascript:", page)
+        assert all("src=" in tag for tag in re.findall(r"<script[^>]*>", page))
+
+
+def test_cookies(app, person):
+    response = app.test_client().get("/")
+    cookie = response.headers["Set-Cookie"]
+    assert "HttpOnly" in cookie and "SameSite=Lax" in cookie and "Secure" not in cookie
+    assert "; Secure" in app.test_client().get("/", base_url="https://study.example").headers["Set-Cookie"]
+    somebody = person().begin().answer(1)
+    value = somebody.http.get_cookie("subdermal").value
+    somebody.http.set_cookie("subdermal", ("A" if value[0] != "A" else "B") + value[1:])  # a forged one is nobody's
+    somebody.get("/question")
+    assert somebody.path == "/"
+
+
+def test_hostile_labels_are_escaped(tmp_path, write_study, request):
+    hostile = "<script>alert('x')</script>\"'><img src=x onerror=alert(1)>"
+    study = write_study(
+        tmp_path / "hostile",
+        title=hostile,
+        consent=hostile,
+        question={"text": hostile, "left_label": hostile, "right_label": "B" + hostile},
+        scale=[{"value": value, "label": f"{value}{hostile}"} for value in range(-2, 3)],
+        familiarity={"question": hostile, "labels": [f"{i}{hostile}" for i in range(5)]},
+        framings=[{"name": name, "label": name + hostile} for name in ("close-up", "head-shot", "half-length")],
+        techniques=[{"name": name, "label": name + hostile} for name in ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")],
+    )
+    app = create_app(study)
+    Person = type(request.getfixturevalue("person")())
+    somebody = Person(app)
+    pages = [somebody.get("/").text]
+    somebody.send("consent", consent="yes")
+    pages += [somebody.page.text, somebody.send("familiarity", familiarity=1).text, somebody.answer(1).page.text]
+    somebody.get("/dashboard/login")
+    somebody.send("password", password=password.reset(app.extensions["database"]))
+    pages += [somebody.page.text, somebody.get("/dashboard/live.json").json["html"]]
+    assert any("&lt;script&gt;" in page for page in pages)
+    for page in pages:
+        assert "<script>" not in page and "<img src=x" not in page and "alert('x')" not in page
+
+
+def test_hostile_input_comes_back_escaped(person):
+    somebody = person()
+    somebody.get("/withdraw")
+    assert "<b>x" not in somebody.send("code", code="<b>x").text
+    assert "<b>x" not in somebody.get("/<b>x").text
+
+
+def test_the_password_is_kept_only_as_a_hash(app):
+    database = app.extensions["database"]
+    secret = password.reset(database)
+    assert re.fullmatch(r"([a-z2-9]{4}-){3}[a-z2-9]{4}", secret)
+    with database.read() as db:
+        record = db.scalar(select(StudyRecord))
+    assert record.password_hash.startswith("scrypt:") and secret not in str(vars(record))
+
+
+def test_without_a_password_nobody_gets_in(person):
+    somebody = person()
+    somebody.get("/dashboard/login")
+    assert somebody.send("password", password="").status_code == 401
+    assert somebody.send("password", password="None").status_code == 401
+
+
+def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(person, experimenter, app, monkeypatch):
+    assert experimenter.get("/dashboard/").status_code == 200
+    secret = password.reset(app.extensions["database"])
+    experimenter.get("/dashboard/")
+    assert experimenter.path == "/dashboard/login"
+
+    from app.dashboard import views
+
+    monkeypatch.setattr(views, "_logins", Limiter(attempts=5, window_s=300))
+    somebody = person()
+    somebody.get("/dashboard/login")
+    codes = [somebody.send("password", password="wrong").status_code for _ in range(5)]
+    form = somebody.form("password")
+    assert codes == [401] * 5
+    assert somebody.http.post("/dashboard/login", data=form | {"password": secret}).status_code == 429
+
+
+def test_the_limiter_forgets_with_time_and_after_success(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("app.security.time.monotonic", lambda: clock[0])
+    limiter = Limiter(attempts=2, window_s=10)
+    assert [limiter.allow("a"), limiter.allow("a"), limiter.allow("a"), limiter.allow("b")] == [True, True, False, True]
+    clock[0] = 11
+    assert limiter.allow("a") and limiter.allow("a") and not limiter.allow("a")
+    limiter.forget("a")
+    assert limiter.allow("a")
+
+
+def test_the_limiter_also_counts_everybody_together():
+    limiter = Limiter(attempts=2, window_s=10)
+    assert [limiter.allow(str(i)) for i in range(21)] == [True] * 20 + [False]
+
+
+def test_logging_out(experimenter):
+    experimenter.get("/dashboard/")
+    experimenter.send("csrf_token")
+    experimenter.get("/dashboard/")
+    assert experimenter.path == "/dashboard/login"
+
+
+def test_nothing_says_who_the_visitor_is(app, person, study_dir):
+    somebody = person()
+    somebody.http.environ_base["REMOTE_ADDR"] = "203.0.113.77"
+    somebody.http.environ_base["HTTP_USER_AGENT"] = "Tell-Tale/1.0"
+    somebody.begin().answer(*[1] * 30)
+    app.extensions["database"].close()
+    stored = b"".join(path.read_bytes() for path in study_dir.glob("study.sqlite3*"))
+    assert b"203.0.113.77" not in stored and b"Tell-Tale" not in stored
+
+
+def test_a_failure_is_a_friendly_page_without_details(app, person, monkeypatch):
+    somebody = person().begin()
+
+    def fail(*_):
+        raise RuntimeError("secret detail")
+
+    monkeypatch.setattr("app.questionnaire.flow.current", fail)
+    page = somebody.get("/question")
+    assert page.status_code == 500 and "saved are safe" in page.text and "secret detail" not in page.text
+    assert page.headers["Content-Security-Policy"].startswith("default-src 'none'")
+    reply = somebody.http.get("/question", headers={"Accept": "application/json"})
+    assert reply.status_code == 500 and "secret" not in reply.text
+
+
+def test_images_are_served_only_as_their_hash_says(app, study_dir):
+    http = app.test_client()
+    sha256, image = next(iter(app.extensions["study"].images_by_sha256.items()))
+    response = http.get(f"/images/{sha256}")
+    assert response.data == image.path.read_bytes() and response.content_type == "image/png"
+    assert response.headers["Cache-Control"] == "public, max-age=31536000, immutable"
+    assert http.get(f"/images/{sha256}", headers={"If-None-Match": response.headers["ETag"]}).status_code == 304
+    image.path.write_bytes(image.path.read_bytes() + b"more")
+    assert http.get(f"/images/{sha256}").status_code == 404
