@@ -68,6 +68,11 @@ class Scan:
     files: dict[str, str]  # sha256 of each file that was read, by the name it was referred to
     notes: tuple[str, ...]  # what the user should be told, one line each
 
+    def provenance(self) -> dict:
+        """What a manifest records: the files by their sha256, and how they were understood. No path of the machine."""
+        understood = {name: getattr(self, name) for name in ("unit", "unit_source", "up", "up_source")}
+        return {"files": self.files, **understood, "parts": dict(zip(self.part_names, self.part_kinds, strict=True))}
+
 
 @np.errstate(over="ignore", invalid="ignore")  # what is not finite is refused, and needs no warning besides
 def read_scan(path: str | Path, unit: str | None = None, up: str | None = None) -> Scan:

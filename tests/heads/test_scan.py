@@ -366,7 +366,10 @@ map_Bump -bm 1.0 normals.png
     scan = folder(files)
     assert (scan.albedo == np.asarray(quarters())).all() and scan.base_colour is None
     assert (scan.roughness == 99).all() and (scan.normal_map == (130, 125, 250)).all()
-    assert len(scan.files) == 5 and scan.part_names == ("Skin",)
+    assert list(scan.files) == ["head.obj", "head materials.mtl", "my head.png", "rough.png", "normals.png"]
+    provenance = json.loads(json.dumps(scan.provenance()))
+    assert provenance["files"] == scan.files and provenance["parts"] == {"Skin": "skin"}
+    assert (provenance["unit"], provenance["unit_source"], provenance["up_source"]) == ("mm", "guessed", "guessed")
 
 
 def test_a_bump_map_of_heights_is_not_taken_for_normals(folder):

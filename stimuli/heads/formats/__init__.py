@@ -10,7 +10,7 @@ import os
 import warnings
 from dataclasses import dataclass, field
 from io import BytesIO
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 import numpy as np
 from PIL import Image
@@ -54,7 +54,7 @@ class Source:
     """The file to read and those beside it: remembers the sha256 of all that was read, and what the user should be told."""
 
     path: Path
-    files: dict[str, str] = field(default_factory=dict)  # name as referenced -> sha256
+    files: dict[str, str] = field(default_factory=dict)  # name as referenced, no absolute path -> sha256
     notes: list[str] = field(default_factory=list)
 
     def error(self, message: str) -> InputError:
@@ -87,7 +87,8 @@ class Source:
             data = place.read_bytes()
         except OSError as error:
             raise self.error(f"{name!r} cannot be read: {error.strerror}") from None
-        self.files[name] = hashlib.sha256(data).hexdigest()
+        plain = PureWindowsPath(name)  # which takes either slash
+        self.files[plain.name if plain.anchor else plain.as_posix()] = hashlib.sha256(data).hexdigest()
         return data
 
     def image(self, data: bytes, name: str) -> np.ndarray:
