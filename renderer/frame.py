@@ -13,10 +13,10 @@ from renderer.profiles import gaussians
 from renderer.techniques.base import Inputs, Technique
 
 LAMP_MAP = 4096
-EXPOSURE = 0.62
-BACKDROP = ((0.060, 0.064, 0.070), (0.010, 0.011, 0.0125))  # radiance at the centre and at the edge
-THICKNESS_SCALE = 0.30  # mm of slab per mm of depth-map thickness
-TRANSMISSION_WRAP = 0.3  # published shader: saturate(0.3 + L . -N)
+EXPOSURE = 0.74
+BACKDROP = ((0.115, 0.120, 0.130), (0.022, 0.024, 0.028))  # radiance at the centre and at the edge
+THICKNESS_SCALE = 0.38  # mm of slab per mm of depth-map thickness
+TRANSMISSION_WRAP = 0.10  # E = saturate(wrap + L . -N): 0 is exact, the published shader uses 0.3
 HAIR_EXTINCTION = 1.5
 SIZE_LIMIT = 8192  # pixels of a side after supersampling
 
@@ -79,13 +79,14 @@ class Renderer:
         light = proxy.to_full @ baked.light.reshape(-1, 9)
         openness = proxy.to_full @ baked.openness[:, None]
         self._skin_light = light
+        scatters = np.ones(len(skin.positions)) if skin.scatters is None else skin.scatters
         self._skin = gl.Mesh({0: skin.positions, 1: skin.normals, 2: skin.uvs, 3: skin.masks[:, :4], 4: skin.masks[:, 4:],
-                              5: light[:, 0:3], 6: light[:, 3:6], 7: light[:, 6:9], 8: openness}, skin.faces)
+                              5: light[:, 0:3], 6: light[:, 3:6], 7: light[:, 6:9], 8: np.column_stack([openness, scatters])}, skin.faces)
         self._eyes = []
         for eye, lit in zip(model.eyes, eyes, strict=True):
             n, flat = len(eye.positions), lit.light.reshape(-1, 9)
             self._eyes.append(gl.Mesh({0: eye.positions, 1: eye.normals, 2: np.zeros((n, 2)), 3: np.zeros((n, 4)), 4: np.zeros((n, 4)),
-                                       5: flat[:, 0:3], 6: flat[:, 3:6], 7: flat[:, 6:9], 8: lit.openness[:, None]}, eye.faces))
+                                       5: flat[:, 0:3], 6: flat[:, 3:6], 7: flat[:, 6:9], 8: np.column_stack([lit.openness, np.zeros(n)])}, eye.faces))
         self._maps = {}
         for name, image in (("albedo_map", skin.albedo_map), ("normal_map", skin.normal_map), ("roughness_map", skin.roughness_map)):
             if image is None:
@@ -259,7 +260,7 @@ class Frame:
         gl.draw_fullscreen(r.context)
         image = np.rint(final.textures[0].read()[..., :3] * 255).astype(np.uint8)
         counts = info.read()
-        result = Result(image, np.rint(counts[..., 0]).astype(np.uint8), counts[..., 1].copy() if scattered.has_contrast else None, light.read())
+        result = Result(image, np.rint(counts[..., 0]).astype(np.uint8), counts[..., 1].copy() if technique.measures_contrast else None, light.read())
         for target in (scattered.target, colour, final):
             target.delete()
         return result

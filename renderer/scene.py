@@ -30,7 +30,8 @@ class Skin:
     albedo_map: np.ndarray | None = None
     normal_map: np.ndarray | None = None
     roughness_map: np.ndarray | None = None
-    base_colour: tuple[float, float, float] | None = None
+    base_colour: tuple[float, float, float] | None = None  # linear albedo where there is no map
+    scatters: np.ndarray | None = None  # (N,) 1 where the material scatters, 0 for eyes and teeth of a scan; None: all of it
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ class Framing:
 FRAMINGS: dict[str, Framing] = {
     "close-up": Framing((9.0, -20.0, -18.0), 136.0, 33.0, 2.0),
     "head-shot": Framing((4.0, -32.0, -60.0), 330.0, 28.0, 2.0),
-    "half-length": Framing((0.0, -128.0, -90.0), 560.0, 20.0, 1.0),
+    "half-length": Framing((2.0, -92.0, -90.0), 452.0, 20.0, 1.0),
 }
 
 
@@ -137,14 +138,15 @@ class Studio:
     """The light of every condition: two shadowed lamps and an environment of soft panels over a constant."""
 
     lamps: tuple[Lamp, ...] = (
-        Lamp("key", (-0.62, 0.55, 0.72), (4.6, 4.35, 4.0), 1.1),
-        Lamp("rim", (0.74, 0.38, -0.62), (3.4, 3.5, 3.7), 1.6),
+        Lamp("key", (-0.62, 0.55, 0.72), (4.5, 4.15, 3.7), 1.1),
+        Lamp("rim", (0.66, 0.40, -0.80), (4.2, 4.2, 4.3), 1.6),
     )
     lobes: tuple[Lobe, ...] = (
-        Lobe((0.85, 0.15, 0.55), 5.0, (0.20, 0.23, 0.28)),  # cool fill from the shadow side
-        Lobe((-0.45, 0.35, 0.85), 7.0, (0.42, 0.40, 0.37)),  # the key's own panel around it
-        Lobe((0.0, 1.0, 0.1), 3.0, (0.30, 0.31, 0.33)),  # overhead
+        Lobe((0.85, 0.15, 0.55), 5.0, (0.15, 0.18, 0.22)),  # cool fill from the shadow side
+        Lobe((-0.45, 0.35, 0.85), 7.0, (0.34, 0.32, 0.29)),  # the key's own panel around it
+        Lobe((0.0, 1.0, 0.1), 3.0, (0.24, 0.25, 0.27)),  # overhead
         Lobe((0.0, -1.0, 0.3), 2.0, (0.075, 0.062, 0.05)),  # floor bounce
+        Lobe((-0.30, 0.38, 0.87), 70.0, (2.6, 2.55, 2.45)),  # a small bright panel: the catchlight
         Lobe((-0.9, 0.1, -0.5), 6.0, (0.18, 0.19, 0.22)),  # back edge
     )
     ambient: tuple[float, float, float] = (0.030, 0.032, 0.036)

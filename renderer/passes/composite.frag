@@ -7,8 +7,8 @@ uniform vec3 backdrop_centre; uniform vec3 backdrop_edge;
 uniform float aspect;
 out vec4 colour;
 
-// John Hable's curve ("Filmic tonemapping operators", 2010), white at 11.2.
-vec3 hable(vec3 x) { return (x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.50) + 0.06) - 0.02 / 0.30; }
+// Narkowicz 2016, "ACES filmic tone mapping curve".
+vec3 filmic(vec3 x) { return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14); }
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
@@ -20,5 +20,5 @@ void main() {
     }
     vec4 strands = texelFetch(hair, at, 0);
     radiance = radiance * (1.0 - strands.a) + strands.rgb;
-    colour = vec4(clamp(hable(2.0 * exposure * radiance) / hable(vec3(11.2)), 0.0, 1.0), 1.0);
+    colour = vec4(clamp(filmic(exposure * radiance), 0.0, 1.0), 1.0);
 }

@@ -34,7 +34,7 @@ void main() {
     iris_colour *= smoothstep(pupil - 0.025, pupil + 0.035, r + 0.008 * noise(vec3(around * 8.0, 2.0)));
 
     // sclera: warm white, veins that fade towards the cornea
-    vec3 sclera = vec3(0.62, 0.575, 0.545) * (1.0 + 0.03 * noise(local / 2.5));
+    vec3 sclera = vec3(0.50, 0.445, 0.415) * (1.0 + 0.03 * noise(local / 2.5));
     vec3 q = local / vec3(1.0, 1.0, 1.4);
     float vein = 0.0;
     for (int k = 0; k < 2; ++k) {
@@ -66,9 +66,9 @@ void main() {
     }
     vec3 r_dir = reflect(-v, n);
     float nv = max(dot(n, v), 0.02);
-    specular += panels(r_dir, 220.0) * schlick(f0, nv) * smoothstep(0.10, 0.55, open_sky) * 1.6;
+    specular += panels(r_dir, 400.0) * schlick(f0, nv) * smoothstep(0.05, 0.45, open_sky);
     // the tear film thickens where the lids meet the eye
-    float lid = smoothstep(0.50, 0.18, open_sky);
+    float lid = smoothstep(0.62, 0.15, open_sky);
     specular *= 1.0 - 0.6 * lid;
     irradiance *= mix(1.0, 0.55, lid);
     out_irradiance = vec4(irradiance, 0.0);

@@ -19,7 +19,7 @@ void main() {
         float lit = exp(-path) * smoothstep(-0.35, 0.25, facing) * visibility(k, world + root_normal * 0.8, root_normal, phase);
         float diffuse = sqrt(max(1.0 - tl * tl, 0.0));
         float sum = tl + tv;
-        vec3 scattered = albedo * diffuse * 0.55 / PI + vec3(0.030) * lobe(sum, 0.12, 0.16) + albedo * 0.10 * lobe(sum, -0.18, 0.30);
+        vec3 scattered = albedo * diffuse * 0.55 / PI + vec3(0.011) * lobe(sum, 0.12, 0.14) + albedo * 0.11 * lobe(sum, -0.16, 0.24);
         radiance += lamp_irradiance[k] * lit * scattered;
     }
     premultiplied = vec4(radiance * opacity, opacity);

@@ -29,7 +29,7 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
         float size = k == 0 ? 0.95 : 0.60;
         Cells c = cells(q / size);
         float own = 0.35 + 0.65 * unit(mix_bits(c.id ^ 0x51u));
-        float depth = (k == 0 ? 0.030 : 0.015) * pores * own * skin * fade(size * 0.6, pixel_mm);
+        float depth = (k == 0 ? 0.042 : 0.022) * pores * own * skin * fade(size * 0.6, pixel_mm);
         float w = k == 0 ? 0.30 : 0.28;
         float e = exp(-c.f1 * c.f1 / (w * w));
         h.x -= depth * e;
@@ -40,7 +40,7 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
             Cells g = cells(q / 0.72 + 31.7);
             float gap = g.f2 - g.f1, wide = 0.16;
             float f = exp(-gap * gap / (wide * wide));
-            float deep = 0.010 * skin * (1.0 - 0.7 * pores) * fade(0.5, pixel_mm);
+            float deep = 0.015 * skin * (1.0 - 0.7 * pores) * fade(0.5, pixel_mm);
             vec3 d = g.d2 / max(g.f2, 1e-3) - g.d1 / max(g.f1, 1e-3);
             h.x -= deep * f;
             h.yzw += deep * f * 2.0 * gap / (wide * wide) * d / 0.72;
@@ -48,7 +48,7 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
     }
     // bumps of 1.6, 4 and 11 mm
     vec4 n1 = value_noise(q / 1.6), n2 = value_noise(q / 4.1 + 7.0), n3 = value_noise(q / 11.0 + 3.0);
-    float t1 = 0.016 * skin * fade(1.0, pixel_mm), t2 = 0.045 * skin, t3 = 0.16 * (1.0 - inside) * (1.0 - 0.6 * lips);
+    float t1 = 0.022 * skin * fade(1.0, pixel_mm), t2 = 0.045 * skin, t3 = 0.16 * (1.0 - inside) * (1.0 - 0.6 * lips);
     h += t1 * vec4(n1.x, n1.yzw / 1.6) + t2 * vec4(n2.x, n2.yzw / 4.1) + t3 * vec4(n3.x, n3.yzw / 11.0);
 
     // forehead: three faint lines that wander
@@ -106,8 +106,8 @@ vec3 colour(vec3 p, float pixel_mm, float pore_shade) {
     float lips = a.x, flush = a.y, hair = a.z, eyelid = a.w, oil = b.y, beard = b.z, inside = b.w;
     vec3 q = p + noise_origin;
     float broad = fbm(q / 38.0), patchy = fbm(q / 9.0 + 4.0), fine = noise(q / 2.2 + 2.0) * fade(1.5, pixel_mm);
-    float melanin = 0.20 + 0.045 * broad + 0.040 * patchy + 0.018 * fine + 0.05 * eyelid + 0.035 * pore_shade * 0.5;
-    float blood = 0.19 + 0.28 * flush + 0.055 * fbm(q / 15.0 + 21.0) + 0.045 * patchy * noise(q / 5.0 + 1.0) + 0.05 * eyelid;
+    float melanin = 0.20 + 0.045 * broad + 0.040 * patchy + 0.018 * fine + 0.05 * eyelid + 0.060 * pore_shade;
+    float blood = 0.21 + 0.34 * flush + 0.075 * fbm(q / 15.0 + 21.0) + 0.045 * patchy * noise(q / 5.0 + 1.0) + 0.05 * eyelid;
     // capillary mottling, strongest where the skin is flushed
     blood += (0.05 + 0.13 * flush) * max(fbm(q / 3.2 + 40.0), 0.0) * fade(2.0, pixel_mm);
     // freckles and a few moles
@@ -121,11 +121,11 @@ vec3 colour(vec3 p, float pixel_mm, float pore_shade) {
     Cells d = cells(q / 0.85 + 8.0);
     float dots = mix(0.22, smoothstep(0.34, 0.16, d.f1), fade(0.9, pixel_mm));
     float rooted = clamp(hair + 0.75 * beard, 0.0, 1.0) * (0.75 + 0.25 * noise(q / 4.0));
-    vec3 pale = vec3(0.800, 0.660, 0.575);
+    vec3 pale = vec3(0.770, 0.610, 0.520);
     vec3 skin = pale * exp(-melanin * vec3(0.55, 1.15, 1.75) - blood * vec3(0.12, 1.05, 0.85));
-    vec3 lip = vec3(0.56, 0.265, 0.235) * (1.0 + 0.10 * fbm(q / 2.5) + 0.06 * noise(q / 0.9));
+    vec3 lip = vec3(0.50, 0.215, 0.195) * (1.0 + 0.10 * fbm(q / 2.5) + 0.06 * noise(q / 0.9));
     skin = mix(skin, lip, 0.88 * smoothstep(0.12, 0.85, lips + 0.10 * noise(q / 1.3)));
-    skin *= 1.0 - rooted * vec3(0.36, 0.33, 0.28) * 0.55 - 0.5 * dots * rooted;
+    skin *= mix(vec3(1.0), vec3(0.42, 0.40, 0.40), hair * 0.9) * (1.0 - rooted * vec3(0.20, 0.18, 0.15) - 0.45 * dots * rooted);
     skin = mix(skin, vec3(0.30, 0.07, 0.06), inside);
     return skin;
 }
@@ -158,7 +158,7 @@ void main() {
         vec4 h = relief(world, pixel_mm, shade);
         n = normalize(smooth_n - (h.yzw - smooth_n * dot(h.yzw, smooth_n)));
         albedo = colour(world, pixel_mm, shade);
-        m = mix(0.40, 0.29, b.y) - 0.10 * a.x + 0.03 * noise((world + noise_origin) / 3.0);
+        m = mix(0.42, 0.27, b.y) - 0.08 * a.x + 0.03 * noise((world + noise_origin) / 3.0);
     } else {
         if (has_albedo_map == 1) albedo = from_srgb(texture(albedo_map, uv).rgb);
         if (has_roughness_map == 1) m = clamp(texture(roughness_map, uv).r, 0.12, 0.9);
@@ -187,7 +187,7 @@ void main() {
             vec3 e = lamp_irradiance[k] * nl * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
             irradiance += e;
             float lobe = 0.75 * kelemen(n, v, l, m * 0.85, 0.028) + 0.25 * kelemen(n, v, l, min(m * 1.5, 0.9), 0.028);
-            specular += e * lobe * (1.0 - 0.85 * b.w);
+            specular += e * lobe * (1.0 - 0.5 * min(shade, 1.0)) * (1.0 - 0.85 * b.w);
         }
         through += transmitted(k, world, smooth_n);
     }
@@ -197,12 +197,13 @@ void main() {
     float nv = max(dot(n, v), 0.02);
     float occlusion = clamp(pow(nv + open_sky, exp2(-16.0 * rough - 1.0)) - 1.0 + open_sky, 0.0, 1.0);  // Lagarde and de Rousiers 2014
     float f = 0.028 + 0.30 * pow(1.0 - nv, 5.0) * (1.0 - rough);
-    specular += panels(r, 2.0 / (rough * rough)) * f * occlusion * (1.0 - 0.9 * b.w);
+    specular += panels(r, 2.0 / (rough * rough)) * f * (1.0 - 0.5 * min(shade, 1.0)) * occlusion * (1.0 - 0.9 * b.w);
 
     vec3 dark = mix(vec3(1.0), vec3(0.35), b.w);
-    out_irradiance = vec4(irradiance * dark, 1.0);
+    float mask = step(0.5, scatters);
+    out_irradiance = vec4(irradiance * dark, mask);
     out_specular = vec4(specular, 1.0);
     out_albedo = vec4(albedo, 1.0);
     out_depth_normal = vec4(view_depth, mat3(view) * n);
-    out_transmitted = vec4(through * (1.0 - b.w), 1.0);
+    out_transmitted = vec4(through * (1.0 - b.w) * mask, 1.0);
 }

@@ -6,17 +6,18 @@ layout(location = 4) in vec4 mask_b;
 layout(location = 5) in vec3 light_r;  // vector irradiance per channel: E(n) = max(0, light . n)
 layout(location = 6) in vec3 light_g;
 layout(location = 7) in vec3 light_b;
-layout(location = 8) in float openness;
+layout(location = 8) in vec2 openness;  // share of open sky; 1 where the material scatters
 uniform mat4 view;
 uniform mat4 projection;
-out vec3 world; out vec3 world_normal; out vec2 uv; out vec4 a; out vec4 b; out mat3 light; out float open_sky;
+out vec3 world; out vec3 world_normal; out vec2 uv; out vec4 a; out vec4 b; out mat3 light; out float open_sky; out float scatters;
 out float view_depth;
 invariant gl_Position;
 void main() {
     vec4 q = view * vec4(position, 1.0);
     world = position; world_normal = normal; uv = texture_uv; a = mask_a; b = mask_b;
     light = mat3(light_r, light_g, light_b);
-    open_sky = openness;
+    open_sky = openness.x;
+    scatters = openness.y;
     view_depth = -q.z;
     gl_Position = projection * q;
 }

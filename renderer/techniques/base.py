@@ -38,20 +38,20 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Scattered:
-    """target.textures[0]: RGBA32F scattered irradiance; [1]: RGBA16F, x = samples taken, y = contrast (where has_contrast)."""
+    """target.textures[0]: RGBA32F scattered irradiance; [1]: RGBA16F, x = samples taken, y = contrast (where it is measured)."""
 
     target: object
-    has_contrast: bool = False
 
 
 @dataclass(frozen=True)
 class Technique:
-    """Base of all techniques. `translucent`: transmitted light is added before scattering."""
+    """Base of all techniques. `translucent`: transmitted light is added before scattering; `measures_contrast`: it writes contrast."""
 
     name: ClassVar[str]
     title: ClassVar[str]
     paper: ClassVar[str]
     translucent: ClassVar[bool] = True
+    measures_contrast: ClassVar[bool] = False
 
     def __post_init__(self):
         for f in dataclasses.fields(self):

@@ -5,7 +5,7 @@ C = |L_in - L_out| / (L_in + L_out) of the irradiance between an inner disc and 
 where round(saturate(C + offset)) is 1 in any channel the extra samples are taken too.
 
 How the thesis's open points are settled: base and extra samples are together exactly golubev's set, so that a pixel
-that takes both equals golubev to the bit; the inner zone is r < R_max / 2 (areas 1 : 3), R_max the farthest base
+that takes both equals golubev but for rounding; the inner zone is r < R_max / 2 (areas 1 : 3), R_max the farthest base
 sample; round(0.5) is up; C = 0 where no light falls; a zone without skin gives no contrast.
 """
 
@@ -17,6 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from renderer import gl
+from renderer.errors import InputError
 from renderer.techniques.base import Inputs, Scattered, output_formats, parameter
 from renderer.techniques.golubev import Golubev, disc
 
@@ -32,12 +33,11 @@ class GolubevPlus(Golubev):
     name: ClassVar[str] = "golubev_plus"
     title: ClassVar[str] = "Golubev Plus"
     paper: ClassVar[str] = "Vuletic, master's thesis, ch. 4"
+    measures_contrast: ClassVar[bool] = True
 
     def __post_init__(self):
         super().__post_init__()
         if self.base_samples >= self.samples:
-            from renderer.errors import InputError
-
             raise InputError(f"{self.name}.base_samples is {self.base_samples}; expected fewer than samples, {self.samples}")
 
     def order(self) -> np.ndarray:
@@ -58,4 +58,4 @@ class GolubevPlus(Golubev):
         program.use(samples=table, threshold=0.5 - self.offset, inner_mm=self.inner_radius * table[: self.base_samples, 2].max(),
                     **self.uniforms(inputs))
         gl.draw_fullscreen(inputs.context)
-        return Scattered(target, has_contrast=True)
+        return Scattered(target)

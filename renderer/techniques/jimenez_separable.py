@@ -14,6 +14,7 @@ import numpy as np
 from OpenGL import GL
 
 from renderer import gl
+from renderer.errors import InputError
 from renderer.profiles import gaussians
 from renderer.techniques.base import Inputs, Scattered, Technique, output_formats, parameter
 
@@ -75,8 +76,6 @@ class JimenezSeparable(Technique):
     def __post_init__(self):
         super().__post_init__()
         if self.taps % 2 == 0:
-            from renderer.errors import InputError
-
             raise InputError(f"{self.name}.taps is {self.taps}; expected an odd number")
 
     def kernel_table(self) -> tuple[np.ndarray, np.ndarray]:

@@ -106,12 +106,12 @@ def scalp_hair(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: 
     flow = _tangential(on_top[:, None] * forward + (1 - on_top)[:, None] * down + 0.30 * _noise(p, 16, 0.3) + 0.22 * _noise(p, 5, 2.0)
                        + 0.20 * rng.normal(size=p.shape), n)
     hair = roots.at(scalp.column("hair"))
-    length = (3.5 + 7.0 * smoothstep(-60, 60, up) + 13.0 * on_top) * (0.75 + 0.25 * hair) * rng.uniform(0.7, 1.1, count)
+    length = (4.5 + 8.0 * smoothstep(-60, 60, up) + 16.0 * on_top) * (0.75 + 0.25 * hair) * rng.uniform(0.7, 1.1, count)
     # the front edge is short and fine
     length *= 0.45 + 0.55 * hair
-    lift = np.radians(28 + 27 * on_top + 9 * rng.normal(size=count))
-    points = grow(roots, flow, length, lift, np.radians(25 + 30 * on_top), rng, frizz=0.10)
-    layer = np.maximum((3.0 + 9.0 * on_top), 1.0)
+    lift = np.radians(24 + 14 * on_top + 8 * rng.normal(size=count))
+    points = grow(roots, flow, length, lift, np.radians(18 + 22 * on_top), rng, frizz=0.08)
+    layer = 2.5 + 5.5 * on_top
     height = np.einsum("spj,sj->sp", points - p[:, None], n)
     cover = np.clip(1 - height / layer[:, None], 0, 1)
     tone = np.exp(0.25 * rng.normal(size=(count, 1)))
@@ -139,22 +139,22 @@ class Projector:
         return _roots(self._scalp, corners, np.clip(weights, 0, 1))
 
 
-def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int = 900) -> list[dict]:
+def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int = 800) -> list[dict]:
     """Each brow follows an arc over its eye; hairs rise at the nose and turn outwards."""
     project, out = Projector(scalp), []
     for centre in eye_centres:
         side = np.sign(centre[0])
-        u = rng.beta(1.15, 1.35, count)
+        u = rng.beta(1.35, 1.30, count)
         x = -17.0 + 41.0 * u
-        arc = 16.2 + 5.2 * np.sin(np.pi * np.clip(0.15 + 0.80 * u, 0, 1)) - 5.8 * smoothstep(0.66, 1.0, u)
-        half = 4.0 * (1 - 0.72 * smoothstep(0.35, 1.0, u)) * smoothstep(-0.10, 0.16, u)
-        v = np.clip(rng.normal(size=count) * 0.48, -1, 1)
+        arc = 14.0 + 7.4 * np.sin(np.pi * np.clip(0.06 + 0.80 * u, 0, 1)) - 5.0 * smoothstep(0.74, 1.0, u)
+        half = 4.0 * (1 - 0.72 * smoothstep(0.35, 1.0, u)) * smoothstep(-0.12, 0.22, u)
+        v = np.clip(rng.normal(size=count) * 0.52, -1, 1)
         roots = project.roots(np.column_stack([centre[0] + side * x, centre[1] + arc + half * v]))
         tilt = np.radians(62 * (1 - smoothstep(0.0, 0.35, u)) + 14 - 34 * smoothstep(0.55, 1.0, u)) - 0.35 * v + 0.16 * rng.normal(size=count)
         flow = _tangential(np.column_stack([side * np.cos(tilt), np.sin(tilt), np.zeros(count)]), roots.normals)
         length = rng.uniform(4.5, 8.0, count) * (0.75 + 0.3 * smoothstep(0.0, 0.3, u)) * (1 - 0.35 * smoothstep(0.7, 1.0, u))
         points = grow(roots, flow, length, np.radians(rng.uniform(10, 24, count)), np.radians(np.full(count, 16.0)), rng, frizz=0.05)
-        out.append(_pack(points, np.full(count, 0.085), BROWN * 1.15 * np.exp(0.25 * rng.normal(size=(count, 1))), np.full((count, POINTS), 0.25), roots.vertex))
+        out.append(_pack(points, rng.uniform(0.045, 0.075, count), BROWN * 1.6 * np.exp(0.25 * rng.normal(size=(count, 1))), np.full((count, POINTS), 0.25), roots.vertex))
     return out
 
 
@@ -176,14 +176,14 @@ def lashes(anatomy: Anatomy, scalp: Scalp, rng: np.random.Generator) -> list[dic
         at = np.column_stack([ball.centre[0] + x, np.polyval(fit[0], x), np.polyval(fit[1], x)])
         outward = (at - ball.centre) / np.linalg.norm(at - ball.centre, axis=1, keepdims=True)
         splay = side * (x * side + 3) / 16.0
-        direction = outward * [1.0, 0.35, 1.0] + np.column_stack([0.55 * splay + 0.10 * rng.normal(size=count), np.full(count, -0.12 if upper else -0.45), np.zeros(count)])
+        direction = outward * [1.0, 0.35, 1.0] + np.column_stack([0.55 * splay + 0.16 * rng.normal(size=count), np.full(count, -0.22 if upper else -0.45), np.zeros(count)])
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         length = (rng.uniform(5.5, 8.5, count) if upper else rng.uniform(3.0, 5.0, count)) * (0.75 + 0.25 * (x * side - low) / (high - low))
         s = np.linspace(0, 1, POINTS)
         curl = np.array([0, 1.0 if upper else -0.35, 0.0])
         points = at[:, None] + length[:, None, None] * (s[None, :, None] * direction[:, None] + (0.62 * s**2)[None, :, None] * curl)
-        points += 0.04 * rng.normal(size=(count, 1, 3)) * length[:, None, None] * s[None, :, None]
-        out.append(_pack(points, np.full(count, 0.075 if upper else 0.06), np.tile(BROWN * 0.7, (count, 1)), np.full((count, POINTS), 0.2), tree.query(at)[1]))
+        points += 0.07 * rng.normal(size=(count, 1, 3)) * length[:, None, None] * s[None, :, None]
+        out.append(_pack(points, np.full(count, 0.060 if upper else 0.045), np.tile(BROWN * 0.7, (count, 1)), np.full((count, POINTS), 0.2), tree.query(at)[1]))
     return out
 
 
@@ -193,7 +193,7 @@ def stubble(scalp: Scalp, rng: np.random.Generator, count: int) -> dict:
     flow = _tangential(np.array([0, -1.0, 0.1]) + 0.5 * _noise(roots.points, 14, 1.0) + 0.35 * rng.normal(size=roots.points.shape), roots.normals)
     length = rng.uniform(0.35, 1.1, count)
     points = grow(roots, flow, length, np.radians(rng.uniform(25, 60, count)), np.zeros(count), rng)
-    return _pack(points, np.full(count, 0.085), BROWN * 1.1 * np.exp(0.3 * rng.normal(size=(count, 1))), np.zeros((count, POINTS)), roots.vertex)
+    return _pack(points, rng.uniform(0.05, 0.08, count), BROWN * 1.3 * np.exp(0.3 * rng.normal(size=(count, 1))), np.zeros((count, POINTS)), roots.vertex)
 
 
 def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int) -> dict:
@@ -203,13 +203,13 @@ def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int)
     roots = scatter_roots(scalp, density, count, rng)
     flow = _tangential(np.array([0, -1.0, -0.3]) + 0.4 * _noise(roots.points, 18, 7.0) + 0.3 * rng.normal(size=roots.points.shape), roots.normals)
     points = grow(roots, flow, rng.uniform(0.8, 2.0, count), np.radians(rng.uniform(20, 50, count)), np.radians(np.full(count, 20.0)), rng)
-    return _pack(points, np.full(count, 0.016), np.tile([0.42, 0.33, 0.24], (count, 1)), np.zeros((count, POINTS)), roots.vertex)
+    return _pack(points, np.full(count, 0.009), np.tile([0.22, 0.15, 0.10], (count, 1)), np.zeros((count, POINTS)), roots.vertex)
 
 
 def all_strands(anatomy: Anatomy, scalp: Scalp, seed: int, share: float = 1.0) -> Strands:
     """Every strand of the head; share scales the numbers (tests use few)."""
     rng = np.random.default_rng([seed, 11])
     eyes = anatomy.landmarks["eyes"]
-    parts = [scalp_hair(scalp, eyes, rng, int(52000 * share)), *brows(scalp, [e.centre for e in anatomy.eyes], rng, int(1000 * share)),
+    parts = [scalp_hair(scalp, eyes, rng, int(78000 * share)), *brows(scalp, [e.centre for e in anatomy.eyes], rng, int(820 * share)),
              *lashes(anatomy, scalp, rng), stubble(scalp, rng, int(9000 * share)), vellus(scalp, eyes, rng, int(16000 * share))]
     return Strands(**{key: np.concatenate([part[key] for part in parts]).astype(np.float32 if key != "root_vertex" else np.int64) for key in parts[0]})

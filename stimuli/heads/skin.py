@@ -10,8 +10,8 @@ from stimuli.heads.mpfb import Anatomy, Bust
 HEAD_AXIS_Z = 45.0  # mm: the vertical axis of the skull that azimuths are measured about
 
 # The hairline and the beard's upper line: azimuth in degrees from the face's middle -> height in mm relative to the eyes.
-HAIRLINE = np.array([(0, 61), (14, 62), (26, 66), (36, 62), (46, 46), (56, 34), (63, 10), (67, -22), (72, -36), (76, -20),
-                     (80, 10), (90, 20), (100, 10), (108, -20), (118, -45), (140, -62), (180, -70)], dtype=float)
+HAIRLINE = np.array([(0, 61), (14, 62), (26, 66), (36, 62), (46, 46), (56, 34), (63, 8), (67, -24), (71, -44), (76, -46),
+                     (81, -30), (88, -6), (97, 2), (108, -20), (118, -45), (140, -62), (180, -70)], dtype=float)
 BEARD_TOP = np.array([(0, -44), (14, -46), (24, -60), (38, -66), (52, -52), (62, -34), (70, -24), (78, -36), (90, -62), (110, -80), (180, -90)], dtype=float)
 BEARD_BOTTOM = np.array([(0, -150), (30, -152), (60, -140), (80, -115), (95, -92), (180, -90)], dtype=float)
 
@@ -66,7 +66,7 @@ def masks(anatomy: Anatomy, bust: Bust) -> np.ndarray:
     neck = smoothstep(-115, -170, up)
     chest = smoothstep(-170, -230, up) * smoothstep(110, 30, np.abs(p[:, 0])) * (p[:, 2] > 20)
     flush = 0.55 * cheek + 0.75 * tip + 0.5 * wings + 0.62 * own["ears"] + 0.28 * chin + 0.16 * forehead + 0.16 * chest + 0.10 * neck
-    flush += 0.35 * own["eyelids"]
+    flush += 0.20 * own["eyelids"]
     pores = 0.30 + 0.62 * tip + 0.60 * wings + 0.42 * cheek + 0.30 * forehead + 0.30 * chin - 0.15 * neck
     pores *= (1 - 0.85 * own["eyelids"]) * (1 - 0.6 * own["ears"])
     oil = 0.25 + 0.55 * tip + 0.45 * wings + 0.45 * forehead + 0.20 * cheek + 0.20 * chin - 0.2 * neck

@@ -1,0 +1,89 @@
+"""subdermal render: one image of one technique."""
+
+from pathlib import Path
+
+import click
+
+SIZE = "WIDTHxHEIGHT"
+
+
+def _size(_context, _parameter, value: str) -> tuple[int, int]:
+    width, cross, height = value.lower().partition("x")
+    if not (cross and width.isdigit() and height.isdigit()):
+        raise click.BadParameter(f"got {value!r}; expected {SIZE}, such as 1920x1080")
+    return int(width), int(height)
+
+
+def _parameter(_context, _parameter, values: tuple[str, ...]) -> dict:
+    import json
+
+    chosen = {}
+    for item in values:
+        name, equals, text = item.partition("=")
+        if not equals:
+            raise click.BadParameter(f"got {item!r}; expected NAME=VALUE")
+        try:
+            chosen[name] = json.loads(text)
+        except ValueError:
+            chosen[name] = text
+    return chosen
+
+
+def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
+    from renderer.errors import InputError
+
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: expected a file name that ends in {' or '.join(suffixes)}")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+
+
+@click.command("render")
+@click.option("--technique", "-t", required=True, help="The technique, by its name in studies (none, golubev, ...).")
+@click.option("--framing", "-f", default="close-up", show_default=True, help="close-up, head-shot or half-length.")
+@click.option("--size", "-s", default="1920x1080", show_default=True, metavar=SIZE, callback=_size, help="Size of the image in pixels.")
+@click.option("--out", "-o", required=True, type=click.Path(dir_okay=False, path_type=Path), help="The PNG file to write.")
+@click.option("--parameter", "-p", "parameters", multiple=True, metavar="NAME=VALUE", callback=_parameter,
+              help="A parameter of the technique, value in JSON; repeat for more.")
+@click.option("--head", default="default", show_default=True, help="The default head, or a scan as .glb, .gltf or .obj.")
+@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the scan's coordinates; guessed and said if not given.")
+@click.option("--supersample", type=click.IntRange(1, 4), default=2, show_default=True, help="Samples a pixel along each side.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of hair, skin noise and baked light.")
+@click.option("--samples", type=click.Path(dir_okay=False, path_type=Path),
+              help="Also write the samples of each pixel, .npy, uint8 at the resolution at which scattering is computed; 0 where nothing scatters.")
+@click.option("--contrast", type=click.Path(dir_okay=False, path_type=Path), help="Also write the local contrast as a grey PNG (golubev_plus).")
+def command(technique, framing, size, out, parameters, head, unit, supersample, seed, samples, contrast):
+    """Render one technique at one framing.
+
+    Prints where the image went and the mean number of samples over the pixels that scatter.
+    """
+    import numpy as np
+    from PIL import Image
+
+    import renderer
+    from renderer.errors import InputError
+    from stimuli.heads import load_head
+
+    chosen = renderer.make(technique, parameters)
+    if framing not in renderer.FRAMINGS:
+        raise InputError(f"no framing {framing!r}; expected one of {', '.join(renderer.FRAMINGS)}")
+    _writable(out, (".png",))
+    if samples:
+        _writable(samples, (".npy",))
+    if contrast:
+        _writable(contrast, (".png",))
+        if not chosen.measures_contrast:
+            raise InputError(f"{technique} measures no contrast; expected golubev_plus with --contrast")
+    loaded = load_head(head, unit, seed)
+    for note in loaded.notes:
+        click.echo(note, err=True)
+    with renderer.Renderer(loaded.model, size=size, supersample=supersample, seed=seed) as drawing:
+        result = drawing.frame(framing).render(chosen)
+    Image.fromarray(result.image).save(out)
+    if samples:
+        np.save(samples, result.samples)
+    if contrast:
+        Image.fromarray(np.rint(np.clip(result.contrast, 0, 1) * 255).astype(np.uint8)).save(contrast)
+    skin = result.samples[result.samples > 0]
+    mean = f"{skin.mean():.2f} samples a pixel over {skin.size} scattering pixels" if skin.size else "no scattering pixel is seen"
+    click.echo(f"{out}: {technique}, {framing}, {size[0]}x{size[1]}; {mean} at {supersample}x{supersample} supersampling")
