@@ -39,11 +39,14 @@ class Database:
         """Connect, migrate to the newest schema and check that the database is this study's and of this kind."""
         try:
             shown = make_url(url).render_as_string(hide_password=True)
+        except ArgumentError:
+            raise InputError(f"--database: expected an SQLAlchemy URL such as sqlite:////data/study.sqlite3, got {url!r}") from None
+        try:
             engine = _engine(url)
             with engine.connect() as connection:
                 _migrate(connection)
-        except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
-            raise InputError(f"--database: expected an SQLAlchemy URL such as sqlite:////data/study.sqlite3, got {url!r} ({error})") from None
+        except (NoSuchModuleError, ModuleNotFoundError) as error:
+            raise InputError(f"{shown}: there is no driver for such a database here ({error})") from None
         except DatabaseError as error:
             raise InputError(f"{shown}: cannot be opened as a database ({str(error.orig).splitlines()[0]})") from None
         except CommandError as error:

@@ -22,8 +22,8 @@ def upgrade() -> None:
         sa.Column("password_hash", sa.String(255)),
         sa.Column("simulation_seed", sa.BigInteger),
         sa.Column("created_at", TIME, nullable=False),
-        sa.CheckConstraint("kind IN ('real', 'simulated')", name="ck_study_kind"),
-        sa.CheckConstraint("id = 1", name="ck_study_one_row"),
+        sa.CheckConstraint("kind IN ('real', 'simulated')", name=op.f("ck_study_kind")),
+        sa.CheckConstraint("id = 1", name=op.f("ck_study_one_row")),
         sa.PrimaryKeyConstraint("id", name="pk_study"),
     )
     op.create_table(
@@ -69,16 +69,16 @@ def upgrade() -> None:
         sa.Column("image_right_sha256", sa.String(64), nullable=False),
         sa.Column("viewport_width", sa.Integer),
         sa.Column("viewport_height", sa.Integer),
-        sa.Column("device_pixel_ratio", sa.Float),
-        sa.Column("shown_width", sa.Float),
-        sa.Column("shown_height", sa.Float),
+        sa.Column("device_pixel_ratio", sa.Double),
+        sa.Column("shown_width", sa.Double),
+        sa.Column("shown_height", sa.Double),
         sa.PrimaryKeyConstraint("id", name="pk_responses"),
         sa.ForeignKeyConstraint(["participant_id"], ["participants.id"], name="fk_responses_participant_id"),
         sa.ForeignKeyConstraint(["trial_id"], ["trials.id"], name="fk_responses_trial_id"),
         sa.UniqueConstraint("participant_id", "trial_id", name="uq_responses_participant_id_trial_id"),
         sa.UniqueConstraint("trial_id", name="uq_responses_trial_id"),
-        sa.CheckConstraint("answer BETWEEN -2 AND 2", name="ck_responses_answer"),
-        sa.CheckConstraint("rt_ms >= 0", name="ck_responses_rt_ms"),
+        sa.CheckConstraint("answer BETWEEN -2 AND 2", name=op.f("ck_responses_answer")),
+        sa.CheckConstraint("rt_ms >= 0", name=op.f("ck_responses_rt_ms")),
     )
     op.create_table(
         "events",

@@ -1,0 +1,268 @@
+"""The questionnaire in Chromium, as people use it: keys, mouse, reload, a lost connection, windows of every size."""
+
+import re
+import shutil
+
+import pytest
+from playwright.sync_api import expect, sync_playwright
+from sqlalchemy import select
+
+from app import create_app
+from app.models import Response, Trial
+from app.server import running
+
+FLAGS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+]
+KEY_OF = {-2: "1", -1: "2", 0: "3", 1: "4", 2: "5"}
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    assert path, "Chromium is missing; `make setup` installs it"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def study_dir(tmp_path, write_study):
+    return write_study(tmp_path / "study", size=(960, 540))
+
+
+@pytest.fixture
+def address(app):
+    with running(app) as address:
+        yield address
+
+
+@pytest.fixture
+def page(chromium):
+    """A page on a desktop screen; whatever its console complains about fails the test."""
+    with chromium.new_context(viewport={"width": 1280, "height": 720}) as context:
+        page = context.new_page()
+        page.set_default_timeout(20_000)
+        complaints = []
+        page.on("console", lambda message: message.type in ("error", "warning") and complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        yield page
+        assert [text for text in complaints if "Failed to load resource: net::" not in text] == []  # those that a test cuts
+
+
+def begin(page, address):
+    page.goto(address)
+    page.check("[name=consent]")
+    page.click("text=Begin")
+    page.get_by_label("Some familiarity").check()
+    page.click("text=Continue")
+    shown(page, 1)
+
+
+def shown(page, number):
+    """Wait until a question and both its images are there to be answered."""
+    expect(page.locator("h1")).to_have_text(re.compile(rf"Question {number}\s"))
+    page.wait_for_selector("main.shown fieldset:enabled")
+
+
+def stored(app):
+    with app.extensions["database"].read() as db:
+        return db.execute(select(Trial, Response).join(Response).order_by(Response.id)).all()
+
+
+def test_all_thirty_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_connection(page, address, app):
+    answers = [(7 * i) % 5 - 2 for i in range(30)]
+    begin(page, address)
+    for number, answer in enumerate(answers, start=1):
+        shown(page, number)
+        if number == 12:  # a choice that is not confirmed is no answer
+            page.keyboard.press("1")
+            page.reload()
+            shown(page, 12)
+            assert page.locator("input[name=answer]:checked").count() == 0
+        if number == 20:
+            lose_connection_while_answering(page, answer)
+        elif number % 2:
+            page.keyboard.press(KEY_OF[answer])
+            page.keyboard.press("Enter")
+        else:
+            page.click(f"label:has(input[name=answer][value='{answer}'])")
+            page.click("text=Confirm")
+    expect(page.locator("#completion-code")).to_have_text(re.compile("^[A-Z2-9]{10}$"))
+
+    rows = stored(app)
+    assert [trial.order for trial, _ in rows] == list(range(1, 31))
+    assert [response.answer for _, response in rows] == answers
+    assert {response.timed_by for _, response in rows} == {"browser"}
+    assert {(r.viewport_width, r.viewport_height, r.device_pixel_ratio) for _, r in rows} == {(1280, 720, 1.0)}
+    assert all(abs(r.shown_width / r.shown_height - 16 / 9) < 0.01 and r.shown_width > 600 for _, r in rows)
+    assert [trial.order for trial, r in rows if r.times_shown > 1] == [12]
+    assert page.evaluate("Object.keys(localStorage)") == []
+
+
+def lose_connection_while_answering(page, answer):
+    page.context.set_offline(True)
+    page.keyboard.press(KEY_OF[answer])
+    page.keyboard.press("Enter")
+    expect(page.locator(".status")).to_have_text("Not saved yet, trying again …")
+    page.keyboard.press("Enter")  # impatience
+    page.wait_for_timeout(1500)
+    expect(page.locator("h1")).to_have_text(re.compile(r"Question 20\s"))
+    page.context.set_offline(False)
+    shown(page, 21)
+
+
+def test_a_page_closed_without_a_connection_sends_its_answer_when_it_is_opened_again(page, address, app):
+    begin(page, address)
+    page.context.set_offline(True)
+    page.keyboard.press("5")
+    page.keyboard.press("Enter")
+    expect(page.locator(".status")).to_have_text("Not saved yet, trying again …")
+    context = page.context
+    page.close()
+    assert stored(app) == []
+    context.set_offline(False)
+    again = context.new_page()
+    again.goto(f"{address}question")
+    shown(again, 2)
+    ((_, response),) = stored(app)
+    assert response.answer == 2 and again.evaluate("Object.keys(localStorage)") == []
+
+
+def test_an_answer_whose_acknowledgement_was_lost_is_one_answer(page, address, app):
+    begin(page, address)
+    cut = []
+
+    def lose_the_reply(route):
+        if route.request.method == "POST" and not cut:
+            cut.append(route.fetch().status)  # the server has it; the page never hears of it
+            route.abort()
+        else:
+            route.continue_()
+
+    page.route("**/question", lose_the_reply)
+    page.keyboard.press("4")
+    page.keyboard.press("Enter")
+    shown(page, 2)
+    assert cut == [200] and [r.answer for _, r in stored(app)] == [1]
+
+
+def test_back_and_double_click_change_nothing(page, address, app):
+    begin(page, address)
+    page.keyboard.press("2")
+    page.dblclick("text=Confirm")
+    shown(page, 2)
+    page.keyboard.press("1")
+    page.keyboard.press("Enter")
+    shown(page, 3)
+    page.go_back()
+    page.wait_for_load_state()
+    page.goto(f"{address}question")
+    shown(page, 3)
+    assert [r.answer for _, r in stored(app)] == [-1, -2]
+
+
+def test_arrows_and_focus(page, address):
+    begin(page, address)
+    page.keyboard.press("ArrowRight")
+    expect(page.get_by_label("No difference seen")).to_be_checked()
+    page.keyboard.press("ArrowRight")
+    expect(page.get_by_label("B, slightly")).to_be_checked()
+    expect(page.get_by_label("B, slightly")).to_be_focused()
+    assert page.evaluate("getComputedStyle(document.activeElement.closest('label')).outlineWidth") == "3px"
+    assert page.get_by_role("group", name="Which image looks more realistic?").count() == 1
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowLeft")
+    expect(page.get_by_label("A, slightly")).to_be_checked()
+
+
+def test_nothing_can_be_answered_before_both_images_are_there(page, address, app):
+    held = []
+    page.route("**/images/*", lambda route: held.append(route) if not held else route.continue_())
+    page.goto(address)
+    page.check("[name=consent]")
+    page.click("text=Begin")
+    page.get_by_label("Some familiarity").check()
+    page.click("text=Continue")
+    page.wait_for_selector("html.ready fieldset:disabled")
+    page.wait_for_timeout(500)
+    assert page.evaluate("[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)") == ["0", "0"]
+    page.keyboard.press("5")
+    page.keyboard.press("Enter")
+    held[0].continue_()
+    shown(page, 1)
+    assert page.evaluate("[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)") == ["1", "1"]
+    assert page.locator("input[name=answer]:checked").count() == 0 and stored(app) == []
+
+
+def test_the_next_images_are_there_before_they_are_asked_for(page, address):
+    begin(page, address)
+    page.wait_for_timeout(500)
+    requested = []
+    page.on("request", lambda request: "/images/" in request.url and requested.append(request.url))
+    upcoming = page.locator("main").get_attribute("data-upcoming").split()
+    page.keyboard.press("3")
+    page.keyboard.press("Enter")
+    shown(page, 2)
+    images = page.evaluate("[...document.querySelectorAll('.pair img')].map((i) => i.getAttribute('src'))")
+    assert images == upcoming
+    sizes = page.evaluate("performance.getEntriesByType('resource').filter((e) => e.name.includes('/images/')).map((e) => [new URL(e.name).pathname, e.transferSize])")
+    fetched = [path for path, size in sizes if size]
+    assert len(fetched) == len(set(fetched))  # no image came over the network twice
+
+
+def test_without_scripts_the_whole_questionnaire_works(chromium, address, app):
+    with chromium.new_context(java_script_enabled=False, viewport={"width": 1280, "height": 720}) as context:
+        page = context.new_page()
+        page.goto(address)
+        page.check("[name=consent]")
+        page.click("text=Begin")
+        page.get_by_label("Some familiarity").check()
+        page.click("text=Continue")
+        for number in range(1, 31):
+            expect(page.locator("h1")).to_have_text(re.compile(rf"Question {number}\s"))
+            page.get_by_label("A, slightly").check()
+            page.click("text=Confirm")
+        expect(page.locator("#completion-code")).to_be_visible()
+    assert [r.answer for _, r in stored(app)] == [-1] * 30
+
+
+@pytest.mark.parametrize(
+    "width, height, beside",
+    [(1920, 1080, True), (1280, 720, True), (960, 540, True), (640, 360, True), (844, 390, True), (390, 844, False), (390, 660, False), (768, 1024, False)],
+)
+def test_images_are_as_large_as_the_window_allows(page, address, width, height, beside):
+    """960 x 540 is 1920 x 1080 at 200 % zoom; phones stand and lie."""
+    page.set_viewport_size({"width": width, "height": height})
+    begin(page, address)
+    a, b = (page.locator(".pair img").nth(i).bounding_box() for i in (0, 1))
+    assert (a["y"] == b["y"]) == beside and (a["x"] == b["x"]) != beside
+    assert a["width"] == b["width"] and abs(a["width"] / a["height"] - 16 / 9) < 0.02
+    room = page.locator(".pair").bounding_box()
+    across, down = (width / 2, room["height"]) if beside else (width, room["height"] / 2)
+    assert a["width"] > min(across - 8, (down - 28) * 16 / 9)  # but for the gap and the labels
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert page.evaluate("document.documentElement.scrollHeight <= innerHeight + 1")
+    for label in page.locator(".options label").all():
+        assert label.evaluate("(l) => l.scrollWidth <= l.clientWidth && l.getBoundingClientRect().height >= 40")
+
+
+def test_the_dashboard_refreshes_by_itself(page, address, app):
+    from app.dashboard import password
+
+    page.goto(f"{address}dashboard/")
+    page.fill("[name=password]", password.reset(app.extensions["database"]))
+    page.click("button:has-text('Log in')")
+    expect(page.locator(".figures dd").first).to_have_text("0")
+    with page.context.browser.new_context() as other:
+        begin(other.new_page(), address)
+    expect(page.locator(".figures dd").first).to_have_text("1", timeout=10_000)
+
+
+def test_the_simulated_study_is_marked(page, study_dir):
+    with running(create_app(study_dir, simulated=True)) as address:
+        page.goto(address)
+        expect(page.locator(".simulated")).to_be_visible()
+        assert page.title().startswith("SIMULATED")

@@ -1,0 +1,126 @@
+"""Durable, migrated, of one kind and one study for ever."""
+
+import json
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import inspect, select, text
+from sqlalchemy.exc import IntegrityError
+
+from app import create_app
+from app.errors import InputError
+from app.models import Base, Participant, Response, StudyRecord, now
+
+
+def test_the_migrations_make_the_schema_of_the_models(app):
+    with app.extensions["database"]._engine.connect() as connection:
+        assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
+        tables = set(inspect(connection).get_table_names())
+    assert tables == {*Base.metadata.tables, "alembic_version"}
+
+
+def test_constraints_are_those_of_the_models(app):
+    with app.extensions["database"]._engine.connect() as connection:
+        found = inspect(connection)
+        for table in Base.metadata.tables.values():
+            unique = {c["name"] for c in found.get_unique_constraints(table.name)}
+            checks = {c["name"] for c in found.get_check_constraints(table.name)}
+            foreign = {c["name"] for c in found.get_foreign_keys(table.name)}
+            for constraint in table.constraints:
+                name = str(constraint.name)
+                if not name.startswith("pk_"):
+                    assert name in unique | checks | foreign, name
+
+
+def test_sqlite_is_set_to_keep_what_it_commits(app):
+    with app.extensions["database"].read() as db:
+        pragmas = {name: db.execute(text(f"PRAGMA {name}")).scalar() for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")}
+    assert pragmas == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1, "busy_timeout": 30_000}
+
+
+def test_starting_again_keeps_everything(study_dir, person, app):
+    person().begin().answer(1, 2)
+    key = app.extensions["database"].record().secret_key
+    app.extensions["database"].close()
+    again = create_app(study_dir)
+    assert again.extensions["database"].record().secret_key == key
+    with again.extensions["database"].read() as db:
+        assert [r.answer for r in db.scalars(select(Response))] == [1, 2]
+
+
+def test_the_database_itself_refuses_a_second_answer(app, person):
+    person().begin().answer(1)
+    with app.extensions["database"].read() as db:
+        first = db.scalars(select(Response)).one()
+        copy = {c.key: getattr(first, c.key) for c in inspect(Response).columns if c.key != "id"}
+    with pytest.raises(IntegrityError), app.extensions["database"].write() as db:
+        db.add(Response(**copy))
+    with pytest.raises(IntegrityError), app.extensions["database"].write() as db:
+        db.add(Response(**copy | {"trial_id": 2, "answer": 3}))
+
+
+def test_a_number_is_never_given_twice(app):
+    database = app.extensions["database"]
+    with database.write() as db:
+        db.add_all([Participant(visit="a"), Participant(visit="b")])
+    with database.write() as db:
+        db.execute(text("DELETE FROM participants WHERE visit = 'b'"))  # nothing in the application does this
+    with database.write() as db:
+        db.add(third := Participant(visit="c"))
+        db.flush()
+        assert third.id == 3
+
+
+def test_times_are_utc_and_aware(app):
+    before = now()
+    with app.extensions["database"].read() as db:
+        created = db.scalar(select(StudyRecord.created_at))
+    assert created.utcoffset().total_seconds() == 0 and abs((created - before).total_seconds()) < 60
+
+
+def test_real_and_simulated_never_mix(study_dir):
+    create_app(study_dir)
+    create_app(study_dir, simulated=True)
+    for file, simulated in (("study.sqlite3", True), ("simulated.sqlite3", False)):
+        with pytest.raises(InputError, match="kind is '(real|simulated)', expected '(real|simulated)'"):
+            create_app(study_dir, f"sqlite:///{study_dir / file}", simulated=simulated)
+
+
+@pytest.mark.parametrize("key, value", [("name", "other"), ("version", 2), ("seed", 8)])
+def test_answers_of_another_study_are_refused(study_dir, key, value):
+    create_app(study_dir)
+    path = study_dir / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["study"][key] = value
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match=f"{key} is .*, expected {value!r}"):
+        create_app(study_dir)
+
+
+@pytest.mark.parametrize(
+    "url, says",
+    [
+        ("nonsense", "expected an SQLAlchemy URL"),
+        ("nonsense://x/y", "no driver for such a database"),
+        ("sqlite:////nonexistent/folder/a.sqlite3", "unable to open database file"),
+        ("sqlite:///{study}/manifest.json", "file is not a database"),
+    ],
+)
+def test_what_is_no_database_gets_one_line(study_dir, url, says):
+    with pytest.raises(InputError, match=says) as caught:
+        create_app(study_dir, url.format(study=study_dir))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_database_of_a_later_version_is_left_alone(study_dir, app):
+    with app.extensions["database"].write() as db:
+        db.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    with pytest.raises(InputError, match="schema is not one of this version"):
+        create_app(study_dir)
+
+
+def test_a_password_in_the_address_is_not_repeated(study_dir):
+    with pytest.raises(InputError) as caught:
+        create_app(study_dir, "postgresql+nodriver://me:tops3cret@localhost/x")
+    assert "tops3cret" not in str(caught.value)

@@ -1,0 +1,125 @@
+"""`subdermal serve` as a process: what it prints, what it refuses, what survives when it is killed."""
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+
+import httpx
+import pytest
+
+from app import create_app
+from app.cli import main
+
+LINES = {"questionnaire": r"questionnaire\s+(\S+)", "password": r"password\s+(\S+)"}
+
+
+class Server:
+    """A `subdermal serve` on a free port, in a process of its own."""
+
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen(
+            [sys.executable, "-u", "-m", "app.cli", "serve", *map(str, arguments), "--port", "0"], stdout=subprocess.PIPE, text=True
+        )
+        self.printed = ""
+        for line in self.process.stdout:
+            self.printed += line
+            if line.startswith("Ctrl+C"):
+                break
+        self.url = self.find("questionnaire")
+
+    def find(self, what):
+        found = re.search(LINES[what], self.printed)
+        return found and found[1]
+
+    def kill(self):
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+
+@pytest.fixture
+def serve():
+    servers = []
+
+    def start(*arguments):
+        servers.append(Server(*arguments))
+        return servers[-1]
+
+    yield start
+    for server in servers:
+        server.kill()
+        server.process.stdout.close()
+
+
+def token(page):
+    return re.search(r'name="csrf_token" value="([^"]+)"', page.text)[1]
+
+
+def log_in(http, url, secret):
+    page = http.get(f"{url}dashboard/login")
+    return http.post(f"{url}dashboard/login", data={"csrf_token": token(page), "password": secret}).url.path
+
+
+def test_killed_between_an_answer_and_the_next_page_nothing_is_lost(study_dir, serve):
+    server = serve(study_dir)
+    with httpx.Client(follow_redirects=True) as http:
+        page = http.get(server.url)
+        page = http.post(server.url, data={"csrf_token": token(page), "consent": "yes"})
+        page = http.post(f"{server.url}familiarity", data={"csrf_token": token(page), "familiarity": "3"})
+        fields = dict(re.findall(r'name="(csrf_token|trial|image_left|image_right)" value="([^"]+)"', page.text))
+        acknowledged = http.post(f"{server.url}question", data=fields | {"answer": "2"}, headers={"Accept": "application/json"})
+        assert acknowledged.json()["outcome"] == "recorded"
+        server.kill()  # no next page was asked for
+
+        again = serve(study_dir)
+        assert again.find("password") is None  # it was shown at the first start
+        page = http.get(f"{again.url}question")  # cookies know no ports: the same browser
+        assert "Question 2 <span>" in page.text
+        repeated = http.post(f"{again.url}question", data=fields | {"answer": "2"}, headers={"Accept": "application/json"})
+        assert repeated.json()["outcome"] == "repeated"
+
+
+def test_the_password_is_shown_once_and_opens_both_dashboards(study_dir, serve):
+    create_app(study_dir, simulated=True)
+    server = serve(study_dir)
+    secret = server.find("password")
+    with httpx.Client(follow_redirects=True) as http:
+        assert log_in(http, server.url, secret) == "/dashboard/"
+        assert log_in(http, f"{server.url}simulated/", secret) == "/simulated/dashboard/"
+        assert "<title>SIMULATED" in http.get(f"{server.url}simulated/dashboard/").text
+        assert "SIMULATED" not in http.get(f"{server.url}dashboard/").text
+        assert "server" not in http.get(server.url).headers
+    server.kill()
+    new = serve(study_dir, "--reset-password")
+    with httpx.Client(follow_redirects=True) as http:
+        assert log_in(http, new.url, secret) == "/dashboard/login"
+        assert log_in(http, new.url, new.find("password")) == "/dashboard/"
+
+
+def test_without_a_simulation_there_is_no_simulated_study(study_dir, serve):
+    server = serve(study_dir)
+    assert "simulated" not in server.printed
+    assert httpx.get(f"{server.url}simulated/").status_code == 404
+
+
+def test_what_cannot_be_served_gets_one_line(study_dir, tmp_path, capsys):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        failures = [
+            ([study_dir, "--port", taken.getsockname()[1]], "Address already in use"),
+            ([study_dir, "--host", "203.0.113.1", "--port", 0], "cannot listen on 203.0.113.1"),
+            ([tmp_path], "manifest.json"),
+            ([tmp_path / "nothing"], "manifest.json"),
+            ([study_dir, "--database", "nonsense"], "expected an SQLAlchemy URL"),
+            ([study_dir, "--port", "seven"], "'seven' is not a valid integer"),
+        ]
+        for arguments, says in failures:
+            assert main(["serve", *map(str, arguments)]) == 2
+            err = capsys.readouterr().err
+            assert says in err and err.count("\n") == 1, err
+
+
+def test_a_busy_port_does_not_use_up_the_password(study_dir, serve):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        assert main(["serve", str(study_dir), "--port", str(taken.getsockname()[1])]) == 2
+    assert serve(study_dir).find("password")
