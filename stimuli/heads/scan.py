@@ -239,7 +239,8 @@ def _unit(source: Source, extents: np.ndarray, given: str | None, of_format: boo
         raise source.error(
             f"is {largest:.4g} units across, which is no head in {', '.join(UNITS_MM)} ({expected}); give its unit, or scale it first"
         )
-    source.note(f"the unit was taken as {unit}, which makes the head {largest * UNITS_MM[unit] / 10:.4g} cm across; say which it is if that is wrong")
+    size = f"{largest * UNITS_MM[unit] / 10:.4g} cm across"
+    source.note(f"the unit was taken as {unit}, which makes the head {size}; say which it is if that is wrong")
     return unit, "guessed"
 
 

@@ -244,6 +244,16 @@ def test_a_scene_graph_is_applied_and_meshes_are_joined_by_part(folder):
     assert_outward(scan, 1, (-30, 40, 80))  # the eye was mirrored
 
 
+def test_normals_follow_a_scale_that_is_not_even(folder):
+    positions, _, faces = ellipsoid()
+    sphere = positions / RADII_MM
+    document = gltf_document({"POSITION": sphere.astype("<f4"), "NORMAL": sphere.astype("<f4")}, faces)
+    document["nodes"][0]["scale"] = list(RADII_MM / 1000)
+    scan = folder({"head.gltf": document})
+    gradient = scan.positions_mm / RADII_MM**2
+    np.testing.assert_allclose(scan.normals, gradient / np.linalg.norm(gradient, axis=1, keepdims=True), atol=1e-5)
+
+
 def test_packed_and_transformed_texture_coordinates_are_unpacked(folder):
     positions, uvs, faces = ellipsoid()
     down = uvs * (1, -1) + (0, 1)  # glTF's v points down
@@ -331,6 +341,8 @@ def test_one_box_in_several_notations(folder, faces):
     scan = folder({"box.obj": QUADS + faces})
     assert len(scan.faces) == 12 and len(scan.positions_mm) >= 8
     assert trimesh.Trimesh(scan.positions_mm, scan.faces).volume == pytest.approx(150 * 230 * 200)
+    assert scan.uvs is None  # and normals: what some corners lack cannot be used
+    assert_outward(scan)
 
 
 def test_a_polygon_is_fanned(folder):
@@ -341,9 +353,10 @@ def test_a_polygon_is_fanned(folder):
 
 
 def test_positions_are_not_merged_where_uvs_or_normals_differ(folder):
-    text = QUADS.replace("v -75 115 100\n", "v -75 115 100\nvt 0 0\nvt 1 0\n") + "f 1/1 2/1 6/1 5/1\nf 2/2 3/2 7/2 6/2"
-    scan = folder({"box.obj": text})
+    scan = folder({"box.obj": QUADS + "vt 0 0\nvt 1 0\nf 1/1 2/1 6/1 5/1\nf 2/2 3/2 7/2 6/2"})
     assert len(scan.positions_mm) == 8 and sorted(scan.uvs[:, 0]) == [0] * 4 + [1] * 4
+    scan = folder({"box.obj": QUADS + "vn 0 -1 0\nvn 1 0 0\nf 1//1 2//1 6//1 5//1\nf 2//2 3//2 7//2 6//2"})
+    assert len(scan.positions_mm) == 8 and sorted(scan.normals[:, 0]) == [0] * 4 + [1] * 4
 
 
 def test_a_material_library_gives_textures_with_spaces_options_and_foreign_paths(folder):
@@ -409,17 +422,16 @@ def test_sixteen_bit_grey_is_not_clipped(folder):
 # Several materials
 
 
-def two_heads(materials: str, uvs_of_second=lambda uvs: uvs) -> str:
-    """Two ellipsoids side by side, each with a material."""
+def heads(*materials: str, last_uvs=lambda uvs: uvs) -> str:
+    """Ellipsoids side by side, 160 mm apart, the middle one of all at 0, each with a material of a.mtl."""
     positions, uvs, faces = ellipsoid()
-    head = f"{materials}\n" + obj_text(positions - (80, 0, 0), faces, uvs, head="usemtl one")
-    body = obj_text(positions + (80, 0, 0), faces, uvs_of_second(uvs), head="usemtl two")
-    count = len(positions)
-    moved = [
-        "f " + " ".join("/".join(str(int(i) + count) for i in corner.split("/")) for corner in line.split()[1:]) if line[:2] == "f " else line
-        for line in body.splitlines()
-    ]
-    return head + "\n".join(moved) + "\n"
+    lines = ["mtllib a.mtl"]
+    for i, material in enumerate(materials):
+        own = last_uvs(uvs) if material == materials[-1] else uvs
+        moved = positions + (80 * (2 * i + 1 - len(materials)), 0, 0)
+        lines += ["v {} {} {}".format(*p) for p in moved] + ["vt {} {}".format(*t) for t in own] + [f"usemtl {material}"]
+        lines += ["f " + " ".join(f"{c}/{c}" for c in face) for face in faces + 1 + i * len(positions)]
+    return "\n".join(lines)
 
 
 BOTH = "newmtl one\nmap_Kd one.png\nnewmtl two\n"
@@ -427,7 +439,7 @@ BOTH = "newmtl one\nmap_Kd one.png\nnewmtl two\n"
 
 def test_several_textures_become_one_atlas(folder):
     files = {
-        "two.obj": two_heads("mtllib a.mtl"),
+        "two.obj": heads("one", "two"),
         "a.mtl": BOTH + "map_Kd two.png\nnorm n.png\n",
         "one.png": quarters(64),
         "two.png": flat_image((9, 99, 199), (64, 32)),
@@ -444,9 +456,17 @@ def test_several_textures_become_one_atlas(folder):
     assert (look_up(scan.normal_map, scan.uvs[second]) == (100, 100, 240)).all()
 
 
+def test_an_atlas_of_three_has_two_rows(folder):
+    colours = {"one": (200, 0, 0), "two": (0, 200, 0), "three": (0, 0, 200)}
+    files = {"three.obj": heads(*colours), "a.mtl": "".join(f"newmtl {name}\nmap_Kd {name}.png\n" for name in colours)}
+    scan = folder(files | {f"{name}.png": flat_image(colour) for name, colour in colours.items()})
+    for part, name in enumerate(scan.part_names):
+        assert (look_up(scan.albedo, scan.uvs[np.unique(scan.faces[scan.parts == part])]) == colours[name]).all()
+
+
 def test_the_atlas_repeats_its_borders_so_that_filtering_does_not_mix_cells(folder):
     files = {
-        "two.obj": two_heads("mtllib a.mtl"),
+        "two.obj": heads("one", "two"),
         "a.mtl": BOTH + "map_Kd two.png\n",
         "one.png": flat_image((200, 0, 0), (64, 64)),
         "two.png": flat_image((0, 0, 200), (64, 64)),
@@ -458,21 +478,21 @@ def test_the_atlas_repeats_its_borders_so_that_filtering_does_not_mix_cells(fold
 
 
 def test_a_part_with_a_mere_colour_joins_the_atlas(folder):
-    files = {"two.obj": two_heads("mtllib a.mtl"), "a.mtl": BOTH + "Kd 0.5 1 0\n", "one.png": quarters()}
+    files = {"two.obj": heads("one", "two"), "a.mtl": BOTH + "Kd 0.5 1 0\n", "one.png": quarters()}
     scan = folder(files)
     second = np.unique(scan.faces[scan.parts == 1])
     assert (look_up(scan.albedo, scan.uvs[second]) == (188, 255, 0)).all()  # sRGB of linear 0.5, as above
 
 
 def test_materials_that_share_their_textures_need_no_atlas(folder):
-    files = {"two.obj": two_heads("mtllib a.mtl"), "a.mtl": BOTH + "map_Kd one.png\n", "one.png": quarters()}
+    files = {"two.obj": heads("one", "two"), "a.mtl": BOTH + "map_Kd one.png\n", "one.png": quarters()}
     scan = folder(files)
     assert scan.albedo.shape == (16, 16, 3) and scan.part_names == ("one", "two")
 
 
 def test_an_atlas_takes_textures_from_other_tiles_but_not_repeated_ones(folder):
     files = {
-        "two.obj": two_heads("mtllib a.mtl", lambda uvs: uvs * 0.9 + (1.05, 3.05)),
+        "two.obj": heads("one", "two", last_uvs=lambda uvs: uvs * 0.9 + (1.05, 3.05)),
         "a.mtl": BOTH + "map_Kd two.png\n",
         "one.png": flat_image((200, 0, 0)),
         "two.png": flat_image((0, 0, 200)),
@@ -481,7 +501,7 @@ def test_an_atlas_takes_textures_from_other_tiles_but_not_repeated_ones(folder):
     assert (look_up(scan.albedo, scan.uvs[np.unique(scan.faces[scan.parts == 1])]) == (0, 0, 200)).all()
     assert_outward(scan, 0, (-80, 0, 0))
     assert_outward(scan, 1, (80, 0, 0))
-    refused(folder, files | {"two.obj": two_heads("mtllib a.mtl", lambda uvs: uvs * 50)}, "'two'", "repeats", "bake")
+    refused(folder, files | {"two.obj": heads("one", "two", last_uvs=lambda uvs: uvs * 50)}, "'two'", "repeats", "bake")
 
 
 def test_a_texture_without_coordinates_is_refused(folder):
@@ -577,6 +597,26 @@ def test_faces_inside_out_are_turned(folder):
     assert_outward(scan)
 
 
+def test_given_normals_tell_the_outside_of_a_flat_mask(folder):
+    flat = np.array([[-75, -115, 0], [75, -115, 0], [75, 115, 0], [-75, 115, 0]], float)
+    for face in ([0, 1, 2, 3], [3, 2, 1, 0]):
+        scan = folder({"mask.obj": obj_text(flat, [face], None, np.tile([0, 0, 1], (4, 1)))})
+        assert_outward(scan, middle=(0, 0, -1))
+
+
+def test_normals_that_cancel_out_are_those_of_a_face(folder):
+    """Two sheets back to back: at the inner point the front's six triangles face the back's six."""
+    x, y = (a.reshape(-1) for a in np.meshgrid([-75, 0, 75], [-115, 0, 115]))
+    quads = np.array([[i, i + 1, i + 4, i + 3] for i in (0, 1, 3, 4)])
+    front, back = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3), quads[:, [0, 3, 1, 1, 3, 2]].reshape(-1, 3)
+    card = obj_text(np.stack([x, y, 0 * x], axis=1), np.concatenate([front, back]) - 10, head="usemtl Lashes")
+    positions, _, faces = ellipsoid()
+    text = obj_text(positions, faces, head="usemtl Skin") + card
+    scan = folder({"head.obj": text})
+    of_card = scan.faces[scan.parts == 1]
+    assert len(of_card) == 16 and (np.abs(scan.normals[of_card, 2]) == 1).all()
+
+
 def test_an_open_scan_is_fine(folder):
     positions, _, faces = ellipsoid()
     front = faces[positions[faces][..., 2].mean(axis=1) > 20]  # a face without the back of its head
@@ -660,6 +700,7 @@ def changed(**changes) -> dict:
         ({"head.obj": TRIANGLE + "f 1 2 0"}, ["line 4", "v indices"]),
         ({"head.obj": TRIANGLE + "f 1 2 -4"}, ["line 4", "v indices"]),
         ({"head.obj": TRIANGLE + "vt 0 0\nf 1/1 2/1 3/2"}, ["line 5", "vt indices from 1 to 1"]),
+        ({"head.obj": TRIANGLE + "vt 0 0\nf 1/-1 2/-1 3/-2"}, ["line 5", "vt indices from 1 to 1"]),
         ({"head.obj": TRIANGLE + "f 1//1 2//1 3//1"}, ["line 4", "vn indices"]),
         ({"head.obj": TRIANGLE + "f 1 2"}, ["line 4", "three corners"]),
         ({"head.obj": TRIANGLE + "f 1 2 3\nf 1 x 3"}, ["line 5", "whole numbers"]),

@@ -1,0 +1,112 @@
+"""The default head's geometry, and the model made of a user's scan."""
+
+import numpy as np
+import pytest
+
+import renderer
+from renderer.scene import MASKS
+from stimuli.heads import fetch, mpfb, subdivide
+from stimuli.heads.model import default_model, scan_model
+
+
+@pytest.fixture(scope="module")
+def anatomy():
+    return mpfb.build_anatomy(fetch.mpfb_data())
+
+
+@pytest.fixture(scope="module")
+def model(anatomy):
+    return default_model(anatomy, seed=3, hair_share=0.05)
+
+
+def cube():
+    points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    return points, quads
+
+
+def test_catmull_clark_of_a_cube():
+    """First level of the cube, by hand: face points 1, edge points 3/4, corners 5/9 of the half edge."""
+    points, quads = cube()
+    smooth, children = subdivide.catmull_clark(quads, 8)
+    new = smooth @ points
+    np.testing.assert_allclose(np.asarray(smooth.sum(axis=1)).ravel(), 1)
+    assert new.shape == (26, 3) and children.shape == (24, 4)
+    np.testing.assert_allclose(np.abs(new[:8]), 5 / 9, atol=1e-12)
+    np.testing.assert_allclose(np.sort(np.abs(new[8:20]), axis=1), np.tile([0, 0.75, 0.75], (12, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.abs(new[20:]).sum(axis=1), 1)
+
+
+def test_catmull_clark_keeps_a_flat_border():
+    x, y = np.meshgrid(np.arange(4.0), np.arange(4.0))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(16)])
+    quads = np.array([[i, i + 1, i + 5, i + 4] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)])
+    smooth, children = subdivide.catmull_clark(quads, 16)
+    new = smooth @ points
+    np.testing.assert_allclose(new[:, 2], 0)
+    assert new[:, 0].min() >= 0 and new[:, 0].max() <= 3 and len(children) == 36
+
+
+def test_the_default_head_is_an_adult_head_in_millimetres(anatomy):
+    mark = anatomy.landmarks
+    apart = np.linalg.norm(anatomy.eyes[0].centre - anatomy.eyes[1].centre)
+    assert 54 < apart < 70  # adults: 51 to 77, mean 63 (Dodgson 2004, doi:10.1117/12.529999)
+    assert 200 < -mark["chin"][1] < 250  # crown to chin; adult men about 232
+    assert 11 < anatomy.eyes[0].radius < 15.5
+    assert mark["nose"][1] > mark["mouth"][1] > mark["chin"][1] and mark["ear_l"][0] > 60 and mark["ear_r"][0] < -60
+
+
+def test_model_parts_fit_together(model):
+    skin = model.skin
+    assert skin.masks.shape == (len(skin.positions), len(MASKS)) and skin.masks.min() >= 0 and skin.masks.max() <= 1
+    assert all(skin.masks[:, k].max() > 0.5 for k in range(len(MASKS)))
+    np.testing.assert_allclose(np.linalg.norm(skin.normals, axis=1), 1, atol=1e-5)
+    assert skin.faces.max() < len(skin.positions) and len(skin.faces) > 150_000
+    carried = skin.proxy.to_full @ skin.proxy.positions
+    assert np.linalg.norm(carried - skin.positions, axis=1).max() < 6.0
+    strands = model.strands
+    assert np.isfinite(strands.points).all() and strands.root_vertex.max() < len(skin.positions)
+    roots = np.linalg.norm(strands.points[:, 0] - skin.positions[strands.root_vertex], axis=1)
+    assert np.quantile(roots, 0.99) < 8 and strands.cover.min() >= 0 and strands.cover.max() <= 1
+    for eye in model.eyes:
+        reach = np.linalg.norm(eye.positions - eye.centre, axis=1)
+        assert reach.min() >= eye.radius - 1e-3 and 0.8 < reach.max() - eye.radius < 3.0  # the cornea stands out
+
+
+def test_hair_repeats_for_one_seed_and_changes_with_it(anatomy, model):
+    again, other = (default_model(anatomy, seed=s, hair_share=0.05) for s in (3, 4))
+    np.testing.assert_array_equal(again.strands.points, model.strands.points)
+    assert again.strands.points.shape == other.strands.points.shape and (again.strands.points != other.strands.points).any()
+
+
+def test_a_scan_renders(tmp_path):
+    import trimesh
+
+    from stimuli.heads.scan import read_scan
+
+    ball = trimesh.creation.icosphere(5, 0.5)
+    ball.apply_scale((160, 235, 200))
+    file = tmp_path / "ball.obj"
+    ball.export(file)
+    scan = read_scan(file, unit="mm")
+    model = scan_model(scan)
+    with renderer.Renderer(model, size=(160, 90), supersample=1, rays=16) as drawing:
+        result = drawing.frame("head-shot").render(renderer.make("golubev"))
+    assert (result.samples > 0).mean() > 0.05 and result.image[result.samples > 0].mean() > 40
+
+
+def test_a_large_scan_is_baked_on_a_cluster(monkeypatch, tmp_path):
+    import trimesh
+
+    from stimuli.heads import model as module
+    from stimuli.heads.scan import read_scan
+
+    ball = trimesh.creation.icosphere(5, 120.0)
+    file = tmp_path / "ball.obj"
+    ball.export(file)
+    monkeypatch.setattr(module, "PROXY_LIMIT", 1000)
+    monkeypatch.setattr(module, "CLUSTER_MM", 12.0)
+    proxy = scan_model(read_scan(file, unit="mm")).skin.proxy
+    assert len(proxy.positions) < 5000 and proxy.faces.max() < len(proxy.positions)
+    assert np.linalg.norm(proxy.to_full @ proxy.positions - ball.vertices[: proxy.to_full.shape[0]], axis=1).max() < 260  # same size of body
+    np.testing.assert_allclose(np.asarray(proxy.to_full.sum(axis=1)).ravel(), 1)
