@@ -43,10 +43,11 @@ class Stimulus:
 
 @dataclass(frozen=True)
 class Built:
-    """How many images a build rendered, and how many it found up to date."""
+    """How many images a build rendered, how many it found up to date, and what there is to say of the head."""
 
     rendered: int
     kept: int
+    notes: tuple[str, ...] = ()
 
 
 def build(study: Study, out: str | Path, force: bool = False, progress: bool = False) -> Built:
@@ -62,7 +63,7 @@ def build(study: Study, out: str | Path, force: bool = False, progress: bool = F
     from renderer import Renderer
     from stimuli.heads import load_head
 
-    head = load_head(study.head.name, study.head.unit)
+    head = load_head(study.head.name, study.head.unit, study.render.seed)
     plan = _plan(study, parameters, head.provenance)
     (out / "images").mkdir(parents=True, exist_ok=True)
     kept = set() if force else {s.file for s in plan if _is_finished(out, s, state)}
@@ -83,7 +84,7 @@ def build(study: Study, out: str | Path, force: bool = False, progress: bool = F
         "licences": head.licences,
     }
     _write_json(out / manifest.NAME, record)
-    return Built(rendered=len(plan) - len(kept), kept=len(kept))
+    return Built(rendered=len(plan) - len(kept), kept=len(kept), notes=head.notes)
 
 
 def resolve(study: Study) -> dict[str, Any]:
@@ -93,21 +94,15 @@ def resolve(study: Study) -> dict[str, Any]:
 
     for i, framing in enumerate(study.framings):
         if framing.name not in renderer.FRAMINGS:
-            raise _fault(study, f"framings[{i}].name", framing.name, renderer.FRAMINGS)
+            raise InputError(
+                f"study {study.name}: framings[{i}].name: got {framing.name!r}, expected one of {', '.join(renderer.FRAMINGS)}"
+            )
     resolved = {}
     for i, condition in enumerate(study.techniques):
-        key = f"techniques[{i}]"
-        if condition.technique not in renderer.TECHNIQUES:
-            raise _fault(study, f"{key}.technique", condition.technique, renderer.TECHNIQUES)
-        technique = renderer.TECHNIQUES[condition.technique]
-        names = [field.name for field in dataclasses.fields(technique) if field.init]
-        for name in condition.parameters:
-            if name not in names:
-                raise _fault(study, f"{key}.parameters", name, names)
         try:
-            resolved[condition.name] = technique(**_frozen(condition.parameters))
+            resolved[condition.name] = renderer.make(condition.technique, _frozen(condition.parameters))
         except renderer.errors.InputError as error:
-            raise InputError(f"study {study.name}: {key}.parameters: {error}") from error
+            raise InputError(f"study {study.name}: techniques[{i}]: {error}") from error
     return resolved
 
 
@@ -209,7 +204,7 @@ def _render(
                     bar.update()
     except KeyboardInterrupt as error:
         raise Stopped(
-            f"stopped with {finished} of {len(todo)} images rendered; the same command goes on from there"
+            f"stopped with {finished} of {len(todo)} images rendered; `subdermal build` without --force goes on from there"
         ) from error
 
 
@@ -277,7 +272,3 @@ def _frozen(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _frozen(entry) for key, entry in value.items()}
     return tuple(map(_frozen, value)) if isinstance(value, list) else value
-
-
-def _fault(study: Study, key: str, got: str, expected: Iterable[str]) -> InputError:
-    return InputError(f"study {study.name}: {key}: got {got!r}, expected one of {', '.join(expected) or 'none'}")

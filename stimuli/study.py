@@ -122,7 +122,7 @@ def load_study(path: str | Path) -> Study:
     study = read_study(
         table,
         render=Render(
-            (width, height), render.number("supersample", 1, 8, default=2), render.number("seed", 0, 2**63 - 1, default=0)
+            (width, height), render.number("supersample", 1, 4, default=2), render.number("seed", 0, 2**63 - 1, default=0)
         ),
         head=_head(head, path.parent),
     )

@@ -60,8 +60,8 @@ class Table:
         return self.take(key, str, expected, lambda value: re.fullmatch(pattern, value) is not None, **options)
 
     def number(self, key: str, low: int, high: int, **options) -> int:
-        """An integer from low to high."""
-        expected = f"an integer from {low} to {high}"
+        """An integer from low to high, both included."""
+        expected = str(low) if low == high else f"an integer from {low} to {high}"
         return self.take(key, int, expected, lambda value: low <= value <= high, **options)
 
     def table(self, key: str, **options) -> "Table":

@@ -15,7 +15,7 @@ import click
     help="Folder for the images and manifest.json; made when it is not there.",
 )
 @click.option("--head", help='Head to show instead of the one that STUDY names: "default", or a scan, FILE.glb or FILE.obj.')
-@click.option("--unit", help="Unit of the scan's coordinates, such as m, cm or mm; guessed, and said, when not given.")
+@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the scan's coordinates; guessed, and said, when not given.")
 @click.option("--force", is_flag=True, help="Render every image anew, also those that are up to date.")
 def command(study: Path, out: Path, head: str | None, unit: str | None, force: bool) -> None:
     """Render the images of the study defined in STUDY, a TOML file, and write their manifest.
@@ -29,4 +29,6 @@ def command(study: Path, out: Path, head: str | None, unit: str | None, force: b
     if head or unit:
         definition = replace(definition, head=HeadChoice(head or definition.head.name, unit or definition.head.unit))
     built = build(definition, out, force=force, progress=True)
+    for note in built.notes:
+        click.echo(note, err=True)
     click.echo(f"{out}: {built.rendered + built.kept} images, {built.rendered} rendered, {built.kept} up to date")

@@ -107,6 +107,12 @@ class Blur:
             raise FakeInputError(f"radius_mm: got {self.radius_mm}, expected > 0")
 
 
+def make(technique, parameters):
+    if technique not in ("plain", "blur"):
+        raise FakeInputError(f"no technique {technique!r}")
+    return Plain() if technique == "plain" else Blur(**parameters)
+
+
 @dataclass
 class FakeRenderer:
     """Draws a colour that depends on all that an image should depend on; `drawn` counts the images."""
@@ -149,14 +155,15 @@ def fake_renderer(monkeypatch):
     renderer, errors, heads = ModuleType("renderer"), ModuleType("renderer.errors"), ModuleType("stimuli.heads")
     errors.InputError = FakeInputError
     renderer.errors, renderer.VERSION, renderer.Renderer = errors, "1", FakeRenderer
-    renderer.TECHNIQUES, renderer.FRAMINGS = {"plain": Plain, "blur": Blur}, {"near": 1, "far": 2}
+    renderer.make, renderer.FRAMINGS = make, {"near": 1, "far": 2}
     head = SimpleNamespace(
         name="default",
         model="sphere",
         provenance={"source": "a sphere"},
         licences=[{"what": "sphere", "licence": "CC0-1.0", "source": "here"}],
+        notes=("a sphere has no face",),
     )
-    heads.load_head = lambda name, unit=None: head
+    heads.load_head = lambda name, unit, seed: head
     for module in (renderer, errors, heads):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     for name, value in (("driver", "fake"), ("drawn", []), ("frames", []), ("stop_after", None)):

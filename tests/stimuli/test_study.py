@@ -64,7 +64,7 @@ def test_head_file_lies_beside_the_study(write_toml):
         ("seed = 7", "seed = 7\nquestions = 1", r"questions: unknown key, did you mean 'question'\?"),
         ("[32, 18]", "[32]", r"render\.size: got \[32\], expected \[width, height\] in pixels"),
         ("[32, 18]", "[32.0, 18]", r"render\.size: got"),
-        ("supersample = 1", "supersample = 0", r"render\.supersample: got 0, expected an integer from 1 to 8"),
+        ("supersample = 1", "supersample = 0", r"render\.supersample: got 0, expected an integer from 1 to 4"),
         ("supersample = 1", "samples = 1", r"render\.samples: unknown key"),
         ('name = "far"', 'name = "near"', r"framings\[1\]\.name: got 'near', expected a value that differs from framings\[0\]"),
         ('label = "Soft"', 'label = "Plain"', r"techniques\[1\]\.label: got 'Plain', expected a value that differs"),
@@ -76,7 +76,7 @@ def test_head_file_lies_beside_the_study(write_toml):
         (
             "[render]",
             "scale = [" + ", ".join(f'{{value = {v}, label = "{v}"}}' for v in (-2, -1, 0, 2, 1)) + "]\n[render]",
-            r"scale\[3\]\.value: got 2, expected an integer from 1 to 1",
+            r"scale\[3\]\.value: got 2, expected 1",
         ),
         ("[render]", '[familiarity]\nquestion = "?"\nlabels = ["a", "b"]\n[render]', r"familiarity\.labels: .* 5 texts"),
         ("[render]", '[head]\nname = ""\n[render]', r"head\.name: got ''"),
