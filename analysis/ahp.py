@@ -25,7 +25,10 @@ RECIPROCAL_TOLERANCE = 0.02
 
 @dataclass(frozen=True)
 class Comparison:
-    """One framing's matrix, (n, n): matrix[i, k] says how much items[i] is preferred to items[k]; NaN where nobody compared them."""
+    """One framing's matrix (n, n): matrix[i, k] says how much items[i] is preferred to items[k].
+
+    It is NaN where nobody compared the two.
+    """
 
     items: tuple[str, ...]
     matrix: np.ndarray
@@ -126,7 +129,7 @@ def priorities_table(comparisons: Mapping[str, Comparison]) -> pd.DataFrame:
 
 
 def read_matrices(path: str | Path) -> dict[str, Comparison]:
-    """Framing -> matrix, from a TOML file: `items = [names]`, then for each framing `[matrix.NAME]` with `rows = [[...], ...]`."""
+    """Framing -> matrix, from a TOML file: `items = [names]`, then for each framing `[matrix.NAME]` with `rows = [[...]]`."""
     path = Path(path)
     try:
         table = tomllib.loads(path.read_text("utf-8"))

@@ -215,7 +215,8 @@ def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
         about, share = table[rows], shares[rows]
         left = starts[rows]
         for answer, column in enumerate(tallies.DISTRIBUTION):
-            ax.barh(range(len(about)), share[:, answer], left=left, height=0.74, color=ANSWERS[answer], edgecolor="white", linewidth=0.4)
+            style = {"height": 0.74, "color": ANSWERS[answer], "edgecolor": "white", "linewidth": 0.4}
+            ax.barh(range(len(about)), share[:, answer], left=left, **style)
             for place, count in enumerate(about[column]):
                 # a digit of 6.5 points needs about 4 % of a panel's width
                 if share[place, answer] >= 4 * len(str(count)):
@@ -364,8 +365,8 @@ def draw_responses(
             _picture(
                 f"preferences_{slugs[framing]}",
                 f"Each technique against each other one: {where}",
-                "How the answers divide (thesis, figures 5.6, 5.7a and 5.9). Bars to the left: the technique in the panel's title "
-                "was preferred; to the right: the one in the row. Numbers in the bars count answers.",
+                "How the answers divide (thesis, figures 5.6, 5.7a and 5.9). Bars to the left: the technique in the "
+                "panel's title was preferred; to the right: the one in the row. Numbers in the bars count answers.",
                 "; ".join(
                     f"{codebook.label(row.technique)} against {codebook.label(row.opponent)}: "
                     f"{row.strong_technique} strong and {row.slight_technique} slight for the first, {row.none} none, "

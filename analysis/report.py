@@ -112,7 +112,7 @@ def report_matrices(comparisons: Mapping[str, Comparison], source: str = "", com
         subtitle="The matrices as given, their priorities and how coherent they are.",
         simulated=False,
         summary=[
-            f"{codebook.framing_label(name)}: {_listed(_first(share, codebook))} comes first with a priority of "
+            f"{codebook.framing_label(name)}: highest priority for {_listed(_first(share, codebook))}, "
             f"{max(share.values()):.3f}. {_coherence(found[name])}"
             for name, share in shares.items()
         ],
@@ -291,8 +291,9 @@ def _summary(
     if len(totals) > 1:
         strength = totals.mean_strength.to_numpy()
         steps = np.diff(strength)
-        falls, rises = (steps < 0).all(), (steps > 0).all()
-        way = "get weaker with every step" if falls else "get stronger with every step" if rises else "neither only weaken nor only grow"
+        way = "neither only weaken nor only grow"
+        if (steps < 0).all() or (steps > 0).all():
+            way = f"get {'weaker' if steps[0] < 0 else 'stronger'} with every step"
         values = ", ".join(
             f"{row.mean_strength:.2f} ({codebook.framing_label(row.framing)})" for row in totals.itertuples()
         )

@@ -120,7 +120,7 @@ def responses_from_records(
 
 
 def _parse(name: str, data: bytes) -> tuple[pd.DataFrame, list[str], list[Finding]]:
-    """The cells as text, with line and last_line; the lines of the file; a finding for each row that has not the header's fields."""
+    """The cells as text, with line and last_line; the lines of the file; findings for rows without the header's fields."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -18,23 +18,34 @@ def names(ctx: click.Context, parameter: click.Parameter, value: str | None) -> 
 @click.command()
 @click.argument("responses", required=False, type=click.Path(path_type=Path))
 @click.option(
-    "--out", required=True, type=click.Path(path_type=Path), help="Folder for tables/, figures/ and report.html; made when it is not there."
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Folder for tables/, figures/ and report.html; made when it is not there.",
 )
 @click.option(
-    "--order", callback=names, metavar="A,B,C",
+    "--order",
+    callback=names,
+    metavar="A,B,C",
     help="Every technique once: the order in which medians are taken. Without it the study's, or that of first appearance.",
 )
 @click.option(
-    "--pair", callback=names, metavar="A,B",
+    "--pair",
+    callback=names,
+    metavar="A,B",
     help="The two techniques of the box plot. Without it golubev,golubev_plus where both are there, else the first two.",
 )
 @click.option(
-    "--study", type=click.Path(path_type=Path), metavar="MANIFEST",
+    "--study",
+    type=click.Path(path_type=Path),
+    metavar="MANIFEST",
     help="The study's manifest.json, or its folder, for labels and order. Without it the manifest.json beside RESPONSES, if any.",
 )
 @click.option(
-    "--matrices", type=click.Path(path_type=Path), metavar="FILE.toml",
-    help="Instead of RESPONSES: matrices of judgements, `items = [names]` and for each framing `[matrix.NAME]` with `rows = [[...], ...]`.",
+    "--matrices",
+    type=click.Path(path_type=Path),
+    metavar="FILE.toml",
+    help="Instead of RESPONSES: `items = [names]` and for each framing `[matrix.NAME]` with `rows = [[1, 0.5, ...], ...]`.",
 )
 def command(
     responses: Path | None,

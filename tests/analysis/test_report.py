@@ -280,7 +280,7 @@ def test_matrices_give_the_published_priorities_in_the_table():
     assert found.priority["close-up"].tolist() == pytest.approx([0.0841, 0.1208, 0.2766, 0.3562, 0.1623], abs=1e-4)
     assert found.cr["half-length", "none"] == pytest.approx(0.0153, abs=1e-4)
     text = " ".join(Page(files["report.html"].decode()).text.split())
-    assert "close-up: golubev_plus comes first with a priority of 0.356." in text
+    assert "head-shot: highest priority for golubev and golubev_plus, 0.284." in text
     assert "that of items in thesis_matrices.toml" in text
 
 
