@@ -12,7 +12,8 @@ import click
 @click.option("--database", metavar="URL", help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.")
 @click.option("--reset-password", is_flag=True, help="Set a new dashboard password, show it once, and end every login.")
 @click.option(
-    "--trusted-proxy", metavar="ADDRESS", help="Address of a reverse proxy that ends https; its X-Forwarded-Proto, -Host and -For are believed."
+    "--trusted-proxy", metavar="ADDRESS",
+    help="Address of a reverse proxy that ends https; its X-Forwarded-Proto, -Host and -For are believed.",
 )
 def command(directory: Path, host: str, port: int, database: str | None, reset_password: bool, trusted_proxy: str | None) -> None:
     """Serve the questionnaire and the dashboard of the study in DIR (a folder with a manifest.json).
@@ -24,7 +25,7 @@ def command(directory: Path, host: str, port: int, database: str | None, reset_p
 
     from app import create_app
     from app.dashboard import password
-    from app.server import bind
+    from app.server import bind, port_of
 
     app = create_app(directory, database)
     study, answers = app.extensions["study"], app.extensions["database"]
@@ -40,7 +41,7 @@ def command(directory: Path, host: str, port: int, database: str | None, reset_p
     if simulated:
         twin.config["PASSWORD_HASH"] = answers.record().password_hash  # one password opens both dashboards
 
-    address = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{server.effective_port}"
+    address = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{port_of(server)}"
     click.echo(f"questionnaire  {address}/")
     click.echo(f"dashboard      {address}/dashboard/")
     if shown:

@@ -8,9 +8,17 @@ import click
 
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--participants", default=20, show_default=True, type=click.IntRange(1, 100_000), help="How many there shall be; those already there count.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, 2**63 - 1), help="Draws every participant's answers; the same seed gives the same ones.")
-@click.option("--url", help="Address of a running simulated study, such as http://127.0.0.1:8000/simulated/. Without it one is started meanwhile.")
+@click.option(
+    "--participants", default=20, show_default=True, type=click.IntRange(1, 100_000),
+    help="How many there shall be; those already there count.",
+)
+@click.option(
+    "--seed", default=1, show_default=True, type=click.IntRange(0, 2**63 - 1),
+    help="Draws every participant's answers; the same seed gives the same ones.",
+)
+@click.option(
+    "--url", help="Address of a running simulated study, such as http://127.0.0.1:8000/simulated/. Without it one is started meanwhile."
+)
 def command(directory: Path, participants: int, seed: int, url: str | None) -> None:
     """Send simulated participants through the questionnaire of the study in DIR.
 
@@ -40,6 +48,7 @@ def command(directory: Path, participants: int, seed: int, url: str | None) -> N
     with database.read() as session:
         answers = export.count(session)
         if answers != expected:
-            raise InputError(f"--url {url}: its {expected} answers are not those of {directory / 'simulated.sqlite3'}, which has {answers}; export them there")
+            here = directory / "simulated.sqlite3"
+            raise InputError(f"--url {url}: its {expected} answers are not the {answers} of {here}; download them from its dashboard")
         export.write(out, session, study, simulated=True)
     click.echo(f"{directory / 'simulated' / 'responses.csv'}: {answers} simulated answers, {len(missing)} participants new")

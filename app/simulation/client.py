@@ -27,7 +27,9 @@ class Form:
     fields: dict[str, str] = field(default_factory=dict)
 
 
-class _Forms(HTMLParser):
+class _Parser(HTMLParser):
+    """Collects the forms of a page, as a browser would send them before anything is chosen."""
+
     def __init__(self):
         super().__init__()
         self.forms: list[Form] = []
@@ -39,6 +41,13 @@ class _Forms(HTMLParser):
         elif tag == "input" and self.forms and attributes.get("name"):
             chosen = attributes.get("type") not in ("radio", "checkbox") or "checked" in attributes
             self.forms[-1].fields.setdefault(attributes["name"], (attributes.get("value") or "") if chosen else "")
+
+
+def forms(html: str) -> list[Form]:
+    """Every form of a page."""
+    parser = _Parser()
+    parser.feed(html)
+    return parser.forms
 
 
 class Visitor:
@@ -112,9 +121,7 @@ class Visitor:
 
 
 def _find(page: httpx.Response, name: str) -> Form | None:
-    parser = _Forms()
-    parser.feed(page.text)
-    return next((form for form in parser.forms if name in form.fields), None)
+    return next((form for form in forms(page.text) if name in form.fields), None)
 
 
 def _checked(page: httpx.Response) -> httpx.Response:

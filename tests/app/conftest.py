@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from sqlalchemy import select
 
 from app import create_app
 from app.models import Participant, Response
+from app.simulation.client import forms
 
 FRAMINGS = ("close-up", "head-shot", "half-length")
 TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
@@ -32,7 +32,8 @@ def write_study():
                 colour = (60 + 40 * t, 90, 60 + 60 * f)
                 Image.fromarray(np.full((size[1], size[0], 3), colour, np.uint8)).save(directory / file)
                 digest = hashlib.sha256((directory / file).read_bytes()).hexdigest()
-                images.append({"framing": framing, "technique": technique, "file": file, "width": size[0], "height": size[1], "sha256": digest})
+                image = {"framing": framing, "technique": technique, "file": file, "sha256": digest}
+                images.append(image | {"width": size[0], "height": size[1]})
         study = {
             "name": "ready-made",
             "title": "Which one?",
@@ -93,14 +94,17 @@ class Person:
 
     def form(self, field: str) -> dict[str, str]:
         """The fields of the form on the page that has `field`, as a browser would send them before anything is chosen."""
-        return next(fields for _, fields in forms(self.page.text) if field in fields)
+        return self._form(field).fields
 
     def send(self, field: str, **filled):
         """Fill in and send the form that has `field`."""
-        action, fields = next((action, fields) for action, fields in forms(self.page.text) if field in fields)
-        data = fields | {name: str(value) for name, value in filled.items()}
-        self.page = self.http.post(action or self.path, data=data, follow_redirects=True)
+        form = self._form(field)
+        data = form.fields | {name: str(value) for name, value in filled.items()}
+        self.page = self.http.post(form.action or self.path, data=data, follow_redirects=True)
         return self.page
+
+    def _form(self, field: str):
+        return next(form for form in forms(self.page.text) if field in form.fields)
 
     def begin(self, familiarity: int = 3) -> Person:
         self.get("/")
@@ -126,24 +130,3 @@ class Person:
     @property
     def answers(self) -> list[int]:
         return [row.answer for row in self.rows]
-
-
-class _Forms(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.forms: list[tuple[str, dict[str, str]]] = []
-
-    def handle_starttag(self, tag, attrs):
-        attributes = dict(attrs)
-        if tag == "form":
-            self.forms.append((attributes.get("action", ""), {}))
-        elif tag == "input" and self.forms and "name" in attributes:
-            chosen = attributes.get("type") not in ("radio", "checkbox")
-            self.forms[-1][1].setdefault(attributes["name"], attributes.get("value", "") if chosen else "")
-
-
-def forms(html: str) -> list[tuple[str, dict[str, str]]]:
-    """(action, fields) of every form of a page."""
-    parser = _Forms()
-    parser.feed(html)
-    return parser.forms

@@ -28,9 +28,8 @@ def test_the_export_has_one_row_for_each_answer(person, experimenter, app):
     rows = table(response)
     assert len(rows) == 32 == int(response.headers["X-Row-Count"])
     with app.extensions["database"].read() as db:
-        expected = db.execute(
-            select(Trial.framing, Trial.left, Trial.right, Trial.order, Response.answer).join(Response).order_by(Trial.participant_id, Trial.order)
-        ).all()
+        columns = (Trial.framing, Trial.left, Trial.right, Trial.order, Response.answer)
+        expected = db.execute(select(*columns).join(Response).order_by(Trial.participant_id, Trial.order)).all()
     assert [(r["framing"], r["left"], r["right"], int(r["order"]), int(r["answer"])) for r in rows] == [tuple(row) for row in expected]
     assert [(r["participant"], r["familiarity"], r["completed"], r["simulated"]) for r in (rows[0], rows[-1])] == [
         ("P0001", "5", "1", "0"),

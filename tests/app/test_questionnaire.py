@@ -29,7 +29,8 @@ def test_trials_are_those_of_the_design_and_recorded(app, person):
         for number in (1, 2):
             recorded = db.scalars(select(Trial).where(Trial.participant_id == number).order_by(Trial.order)).all()
             expected = trials(study.framings, study.techniques, study.seed, number)
-            assert [(t.order, t.framing, t.left, t.right) for t in recorded] == [(t.order, t.framing, t.left, t.right) for t in expected]
+            lists = [[(t.order, t.framing, t.left, t.right) for t in some] for some in (recorded, expected)]
+            assert lists[0] == lists[1]
             assert {t.seed for t in recorded} == {f"7/{number}"}
 
 
@@ -43,10 +44,11 @@ def test_the_page_does_not_tell_which_technique_is_shown(app, person):
 
 def test_what_the_browser_measured_is_recorded(person):
     somebody = person().begin()
-    somebody.send("trial", answer=1, rt_ms=4321, viewport_width=1280, viewport_height=720, device_pixel_ratio=1.25, shown_width=630.5, shown_height=354.66)
+    measured = {"viewport_width": 1280, "viewport_height": 720, "device_pixel_ratio": 1.25, "shown_width": 630.5, "shown_height": 354.66}
+    somebody.send("trial", answer=1, rt_ms=4321, **measured)
     row = somebody.rows[0]
     assert (row.rt_ms, row.timed_by, row.times_shown) == (4321, "browser", 1)
-    assert (row.viewport_width, row.viewport_height, row.device_pixel_ratio, row.shown_width, row.shown_height) == (1280, 720, 1.25, 630.5, 354.66)
+    assert {name: getattr(row, name) for name in measured} == measured
 
 
 def test_without_scripts_the_server_takes_the_time(person):

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from flask import url_for
 from sqlalchemy import select
 
 from app import create_app
@@ -10,18 +11,27 @@ from app.dashboard import password
 from app.models import StudyRecord
 from app.security import Limiter
 
+FRAMINGS = ("close-up", "head-shot", "half-length")
+TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
+
 POSTS = ["/", "/familiarity", "/question", "/withdraw", "/another", "/dashboard/login", "/dashboard/logout", "/simulation/"]
-CLOSED = ["/dashboard/", "/dashboard/live.json", "/dashboard/responses.csv", "/dashboard/codebook.csv", "/dashboard/codebook.md", "/dashboard/report/", "/dashboard/report/report.html"]
+CLOSED = [
+    f"/dashboard/{name}"
+    for name in ("", "live.json", "responses.csv", "codebook.csv", "codebook.md", "report/", "report/report.html")
+]
+OPEN = [
+    "/", "/familiarity", "/question", "/thanks", "/withdraw", "/withdrawn", "/study.css", "/dashboard/login",
+    "/simulation/", "/simulation/status.json",
+]
 
 
 def addresses(app, method):
     """An address for every rule of the application that takes the method."""
     for rule in app.url_map.iter_rules():
         if method in rule.methods:
-            values = {"sha256": next(iter(app.extensions["study"].images_by_sha256)), "filename": "style.css", "name": "report.html"}
+            sha256 = next(iter(app.extensions["study"].images_by_sha256))
+            values = {"sha256": sha256, "filename": "style.css", "name": "report.html"}
             with app.test_request_context():
-                from flask import url_for
-
                 yield url_for(rule.endpoint, **{name: values[name] for name in rule.arguments})
 
 
@@ -33,9 +43,8 @@ def twin(study_dir):
 
 def test_the_lists_above_are_complete(twin):
     assert set(addresses(twin, "POST")) == set(POSTS)
-    open_to_all = {"/", "/familiarity", "/question", "/thanks", "/withdraw", "/withdrawn", "/study.css", "/dashboard/login", "/simulation/", "/simulation/status.json"}
     rest = {path for path in addresses(twin, "GET") if not path.startswith(("/images/", "/static/"))}
-    assert rest == set(CLOSED) | open_to_all
+    assert rest == {*CLOSED, *OPEN}
 
 
 @pytest.mark.parametrize("path", POSTS)
@@ -107,8 +116,8 @@ def test_hostile_labels_are_escaped(tmp_path, write_study, request):
         question={"text": hostile, "left_label": hostile, "right_label": "B" + hostile},
         scale=[{"value": value, "label": f"{value}{hostile}"} for value in range(-2, 3)],
         familiarity={"question": hostile, "labels": [f"{i}{hostile}" for i in range(5)]},
-        framings=[{"name": name, "label": name + hostile} for name in ("close-up", "head-shot", "half-length")],
-        techniques=[{"name": name, "label": name + hostile} for name in ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")],
+        framings=[{"name": name, "label": name + hostile} for name in FRAMINGS],
+        techniques=[{"name": name, "label": name + hostile} for name in TECHNIQUES],
     )
     app = create_app(study)
     Person = type(request.getfixturevalue("person")())

@@ -123,3 +123,17 @@ def test_a_busy_port_does_not_use_up_the_password(study_dir, serve):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         assert main(["serve", str(study_dir), "--port", str(taken.getsockname()[1])]) == 2
     assert serve(study_dir).find("password")
+
+
+def test_behind_a_proxy_that_ends_https_the_cookie_is_for_https_only(study_dir, serve):
+    server = serve(study_dir, "--trusted-proxy", "127.0.0.1")
+    forwarded = {"X-Forwarded-Proto": "https", "X-Forwarded-Host": "study.example"}
+    page = httpx.get(server.url, headers=forwarded)
+    cookie = page.headers["Set-Cookie"]
+    assert "; Secure" in cookie and "; Secure" not in httpx.get(server.url).headers["Set-Cookie"]
+    headers = forwarded | {"Cookie": cookie.split(";")[0]}
+    data = {"csrf_token": token(page), "consent": "yes"}
+    assert httpx.post(server.url, data=data, headers=headers | {"Referer": "https://evil.example/"}).status_code == 400
+    assert httpx.post(server.url, data=data, headers=headers | {"Referer": "https://study.example/"}).status_code == 303
+    plain = serve(study_dir)  # without the option, nobody is believed
+    assert "; Secure" not in httpx.get(plain.url, headers=forwarded).headers["Set-Cookie"]
