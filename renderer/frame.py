@@ -135,6 +135,7 @@ class Renderer:
         """Draw what all techniques share for one framing, by name."""
         if framing not in scene.FRAMINGS:
             raise InputError(f"no framing {framing!r}; expected one of {', '.join(scene.FRAMINGS)}")
+        self.context.make_current()
         return Frame(self, framing)
 
 
@@ -245,6 +246,7 @@ class Frame:
     def render(self, technique: Technique) -> Result:
         """The image of one technique."""
         r = self.renderer
+        r.context.make_current()
         scattered = technique.scatter(self.inputs(technique.translucent))
         light, info = scattered.target.textures
         colour = gl.Target(self.width, self.height, [GL.GL_RGBA16F])

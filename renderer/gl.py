@@ -52,16 +52,23 @@ class Context:
             ("gl_vendor", GL.GL_VENDOR), ("gl_renderer", GL.GL_RENDERER), ("gl_version", GL.GL_VERSION))}
         self.info["platform"] = name
 
+    def make_current(self) -> None:
+        """Draw with this context from now on (several may be open)."""
+        self._platform.make_current()
+
     def close(self) -> None:
-        if self._platform is not None:
+        """Destroy the context and all that it holds."""
+        if self._platform is None:
+            return
+        if self.name == "egl":  # pyrender's delete_context ends the whole display, other contexts with it
+            from OpenGL.EGL import EGL_NO_CONTEXT, EGL_NO_SURFACE, eglDestroyContext, eglMakeCurrent
+
+            display, context = self._platform._egl_display, self._platform._egl_context
+            eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT)
+            eglDestroyContext(display, context)
+        else:
             self._platform.delete_context()
-            self._platform = None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
+        self._platform = None
 
 
 def source(path: str, defines: dict[str, object] | None = None) -> str:

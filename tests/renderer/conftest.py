@@ -1,0 +1,62 @@
+"""The default head, drawn small: one model and one context for all tests of the renderer."""
+
+import numpy as np
+import pytest
+
+import renderer as package
+from renderer import gl
+from stimuli.heads import fetch, mpfb
+from stimuli.heads.model import default_model
+
+SIZE = (320, 180)
+
+
+@pytest.fixture(scope="session")
+def anatomy():
+    return mpfb.build_anatomy(fetch.mpfb_data())
+
+
+@pytest.fixture(scope="session")
+def model(anatomy):
+    return default_model(anatomy, seed=0, hair_share=0.1)
+
+
+@pytest.fixture(scope="session")
+def drawing(model):
+    with package.Renderer(model, size=SIZE, supersample=2, seed=0, rays=36) as renderer:
+        yield renderer
+
+
+@pytest.fixture(scope="session")
+def frames(drawing):
+    return {name: drawing.frame(name) for name in package.FRAMINGS}
+
+
+@pytest.fixture(scope="session")
+def techniques():
+    return {name: package.make(name) for name in package.TECHNIQUES}
+
+
+@pytest.fixture(scope="session")
+def results(frames, techniques):
+    """framing -> technique -> Result"""
+    return {f: {t: frame.render(technique) for t, technique in techniques.items()} for f, frame in frames.items()}
+
+
+@pytest.fixture
+def patch(frames, drawing):
+    """Replaces the head by a flat patch that faces the camera: patch(irradiance (H, W, 3), depth_mm, mask) -> Inputs."""
+
+    def inputs(irradiance, depth_mm=400.0, mask=None):
+        drawing.context.make_current()
+        frame = frames["close-up"]
+        height, width = irradiance.shape[:2]
+        assert (width, height) == (frame.width, frame.height)
+        mask = np.ones((height, width)) if mask is None else mask
+        colour = np.dstack([irradiance, mask]).astype(np.float32)[::-1]
+        depth = np.zeros((height, width, 4), dtype=np.float32)
+        depth[..., 0], depth[..., 3] = depth_mm, 1
+        textures = [gl.Texture(width, height, gl.GL.GL_RGBA32F, data=data) for data in (colour, depth[::-1])]
+        return frame.inputs(False, *textures)
+
+    return inputs

@@ -1,0 +1,141 @@
+"""Whole frames: what techniques share is shared to the bit; bytes repeat; the drivers agree."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import renderer
+from renderer.errors import InputError
+from renderer.gl import Program
+
+
+def no_skin(result, supersample=2):
+    """Output pixels none of whose samples sees scattering material."""
+    h, w = result.samples.shape
+    return result.samples.reshape(h // supersample, supersample, w // supersample, supersample).max(axis=(1, 3)) == 0
+
+
+def test_where_no_skin_is_seen_all_techniques_agree_to_the_bit(results):
+    for framing, by_name in results.items():
+        reference = by_name["none"]
+        outside = no_skin(reference)
+        assert 0.1 < outside.mean() < 0.95, framing
+        eyes_and_hair = outside & (np.abs(reference.image.astype(int) - reference.image[2, 2]).max(axis=2) > 60)
+        assert framing == "half-length" or eyes_and_hair.any(), f"{framing}: no eye or hair pixel checked"
+        for name, result in by_name.items():
+            np.testing.assert_array_equal(result.image[outside], reference.image[outside], err_msg=f"{framing} {name}")
+            np.testing.assert_array_equal(no_skin(result), outside)
+
+
+def test_on_skin_every_pair_of_techniques_differs(results):
+    """No technique is another under a second name; golubev_plus is close to golubev, none is far from all."""
+    close = results["close-up"]
+    skin = ~no_skin(close["none"])
+
+    def distance(a, b):
+        return np.abs(close[a].image[skin].astype(float) - close[b].image[skin]).mean()
+
+    names = list(close)
+    for i, a in enumerate(names):
+        for b in names[i + 1 :]:
+            assert distance(a, b) > 0.05, (a, b)
+    assert distance("golubev", "golubev_plus") < 0.5 * distance("golubev", "none")
+
+
+def test_samples_are_counted(results):
+    for framing, by_name in results.items():
+        assert set(np.unique(by_name["none"].samples)) == {0, 1}
+        assert set(np.unique(by_name["golubev"].samples)) == {0, 22}
+        plus = by_name["golubev_plus"]
+        assert set(np.unique(plus.samples)) == {0, 12, 22}
+        assert plus.contrast is not None and 0 <= plus.contrast.min() and plus.contrast.max() <= 1
+        np.testing.assert_array_equal(plus.samples == 22, plus.contrast >= 0.25)
+        assert by_name["golubev"].contrast is None
+
+
+def test_the_light_that_comes_through_is_added_for_scattering_techniques_alone(frames, drawing):
+    drawing.context.make_current()
+    frame = frames["close-up"]
+    plain, lit = frame.irradiance(False).read(), frame.irradiance(True).read()
+    mask = plain[..., 3] > 0
+    np.testing.assert_array_equal(plain[~mask], lit[~mask])
+    gain = (lit - plain)[mask][:, :3]
+    assert (gain >= 0).all() and gain[:, 0].max() > 0.3 and gain[:, 0].sum() > 2 * gain[:, 2].sum()
+    assert not renderer.TECHNIQUES["none"].translucent
+    assert all(kind.translucent for name, kind in renderer.TECHNIQUES.items() if name != "none")
+
+
+def test_a_frame_drawn_twice_has_the_same_bytes(model, results):
+    with renderer.Renderer(model, size=(320, 180), supersample=2, seed=0, rays=36) as second:
+        again = second.frame("head-shot").render(renderer.make("golubev_plus"))
+    np.testing.assert_array_equal(again.image, results["head-shot"]["golubev_plus"].image)
+    np.testing.assert_array_equal(again.samples, results["head-shot"]["golubev_plus"].samples)
+
+
+def test_another_seed_gives_another_skin(model, results):
+    with renderer.Renderer(model, size=(320, 180), supersample=2, seed=1, rays=36) as second:
+        other = second.frame("close-up").render(renderer.make("none"))
+    assert (other.image != results["close-up"]["none"].image).any()
+
+
+@pytest.mark.parametrize("platform", ["egl", "osmesa"])
+def test_command_line_render(platform, tmp_path):
+    """Both platforms draw; their bytes are compared in the next test."""
+    out = tmp_path / "image.png"
+    run = subprocess.run(
+        [sys.executable, "-m", "app.cli", "render", "-t", "golubev_plus", "-f", "head-shot", "-s", "160x90", "--supersample", "1", "-o", out,
+         "--samples", tmp_path / "n.npy", "--contrast", tmp_path / "c.png"],
+        env={**__import__("os").environ, "PYOPENGL_PLATFORM": platform}, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert Image.open(out).size == (160, 90)
+    samples = np.load(tmp_path / "n.npy")
+    assert samples.shape == (90, 160) and set(np.unique(samples)) == {0, 12, 22}
+    assert Image.open(tmp_path / "c.png").size == (160, 90)
+    seen = test_command_line_render.__dict__.setdefault("seen", {})
+    seen[platform] = out.read_bytes()
+
+
+def test_egl_and_osmesa_give_the_same_bytes():
+    seen = test_command_line_render.__dict__.get("seen", {})
+    assert seen.keys() == {"egl", "osmesa"}, "the renders of the test before are missing"
+    assert seen["egl"] == seen["osmesa"]
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (["-t", "golub", "-o", "a.png"], "no technique 'golub'"),
+    (["-t", "none", "-f", "far", "-o", "a.png"], "no framing 'far'"),
+    (["-t", "none", "-s", "big", "-o", "a.png"], "expected WIDTHxHEIGHT"),
+    (["-t", "none", "-o", "a.jpg"], "expected a file name that ends in .png"),
+    (["-t", "none", "-o", "nowhere/a.png"], "there is no folder"),
+    (["-t", "none", "-o", "a.png", "--contrast", "c.png"], "measures no contrast"),
+    (["-t", "golubev", "-p", "samples=0", "-o", "a.png"], "golubev.samples is 0"),
+    (["-t", "golubev", "-p", "samples", "-o", "a.png"], "expected NAME=VALUE"),
+    (["-t", "none", "--head", "gone.obj", "-o", "a.png"], "gone.obj"),
+    (["-t", "none"], "--out"),
+])
+def test_command_line_refuses_in_one_line(arguments, words, capsys, tmp_path, monkeypatch):
+    from app.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["render", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1 and "Traceback" not in error
+    assert not list(tmp_path.iterdir())
+
+
+def test_sizes_out_of_range_are_refused(model):
+    for size, supersample in (((8, 90), 1), ((9000, 90), 1), ((5000, 90), 2), ((160, 90), 7)):
+        with pytest.raises(InputError, match="expected"):
+            renderer.Renderer(model, size=size, supersample=supersample)
+
+
+def test_a_program_wants_exactly_its_uniforms(drawing):
+    drawing.context.make_current()
+    program: Program = drawing.program("techniques/none.glsl")
+    with pytest.raises(ValueError, match="techniques/none.glsl: uniforms not given: irradiance"):
+        program.use()
+    with pytest.raises(ValueError, match="no such uniforms: colour"):
+        program.use(irradiance=None, colour=1)
