@@ -29,6 +29,7 @@ def numbers(db: Session, study: Study, *, simulated: bool) -> dict[str, Any]:
             "dropped_out": states.count("dropped out"),
             "withdrawn": states.count("withdrawn"),
             "answers": export.count(db),
+            "about_other_images": about_other_images(db, study),
         },
         "participants": people,
         "framings": framings(db, study, simulated=simulated),
@@ -105,6 +106,13 @@ def framings(db: Session, study: Study, *, simulated: bool) -> list[dict[str, An
             }
         )
     return result
+
+
+def about_other_images(db: Session, study: Study) -> int:
+    """How many answers are about images that the study no longer has (it was built again in between)."""
+    images = (Response.image_left_sha256, Response.image_right_sha256)
+    pairs = db.execute(export.counted(*images, func.count()).group_by(*images))
+    return sum(count for left, right, count in pairs if not {left, right} <= study.images_by_sha256.keys())
 
 
 def sides(db: Session, study: Study) -> dict[str, Any]:

@@ -46,9 +46,14 @@ class Answer:
     shown_height: float | None = None
 
 
-def find(session: Session, visit: str | None) -> Participant | None:
-    """The participant of a visit; None before consent."""
-    return session.scalar(select(Participant).where(Participant.visit == visit)) if visit else None
+def find(session: Session, visit: str | None, *, alone: bool = False) -> Participant | None:
+    """The participant of a visit; None before consent.
+
+    alone: wait until no other transaction holds this participant, so that two clicks come one after the other
+    (SQLite has one writer anyway).
+    """
+    query = select(Participant).where(Participant.visit == visit)
+    return session.scalar(query.with_for_update() if alone else query) if visit else None
 
 
 def enrol(session: Session, study: Study, visit: str) -> Participant:

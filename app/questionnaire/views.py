@@ -54,7 +54,7 @@ def consent():
 @blueprint.get("/familiarity")
 def familiarity():
     with database().read() as db:
-        participant = _participant(db)
+        participant = _participant(db, alone=True)
         if elsewhere := _elsewhere(db, participant):
             return elsewhere
         return render_template("questionnaire/familiarity.html", participant=participant)
@@ -67,7 +67,7 @@ def rate():
         flash("Please choose one of the levels.")
         return redirect(url_for(".familiarity"), 303)
     with database().write() as db:
-        participant = _participant(db)
+        participant = _participant(db, alone=True)
         if participant:
             flow.rate(db, participant, value)
         place = _place(db, participant)
@@ -77,7 +77,7 @@ def rate():
 @blueprint.get("/question")
 def question():
     with database().write() as db:
-        participant = _participant(db)
+        participant = _participant(db, alone=True)
         if elsewhere := _elsewhere(db, participant):
             return elsewhere
         trial = flow.current(db, participant)
@@ -115,12 +115,12 @@ def answer():
         shown_height=_number("shown_height", _LARGEST_SIZE),
     )
     with database().write() as db:
-        participant = _participant(db)
+        participant = _participant(db, alone=True)
         if participant is None:
             abort(400, "This browser has not begun the questionnaire.")
         outcome = flow.answer(db, study(), participant, trial, given)
     with database().write() as db:  # the answer is on the disk: now the committed answers can be counted
-        participant = _participant(db)
+        participant = _participant(db, alone=True)
         flow.complete(db, participant)
         place = _place(db, participant)
     kept = outcome in (Outcome.RECORDED, Outcome.REPEATED)
@@ -136,7 +136,7 @@ def answer():
 @blueprint.get("/thanks")
 def thanks():
     with database().write() as db:
-        participant = _participant(db)
+        participant = _participant(db, alone=True)
         if participant:
             flow.complete(db, participant)  # where the server stopped between the last answer and the count
         if elsewhere := _elsewhere(db, participant):
@@ -162,7 +162,7 @@ def withdraw_now():
                 flash("No participant was given this code. Please check it.")
                 return redirect(url_for(".withdraw"), 303)
             session["visit"] = participant.visit
-        elif (participant := _participant(db)) is None:
+        elif (participant := _participant(db, alone=True)) is None:
             return redirect(url_for(".withdraw"), 303)
         flow.withdraw(db, participant)
     return redirect(url_for(".withdrawn"), 303)
@@ -181,8 +181,8 @@ def another():
     return redirect(url_for(".welcome"), 303)
 
 
-def _participant(db: Session) -> Participant | None:
-    return flow.find(db, session.get("visit"))
+def _participant(db: Session, *, alone: bool = False) -> Participant | None:
+    return flow.find(db, session.get("visit"), alone=alone)
 
 
 def _place(db: Session, participant: Participant | None) -> str:

@@ -129,6 +129,15 @@ def test_the_report_is_served_behind_the_login_with_its_own_policy(person, exper
     assert stranger.path == "/dashboard/login"
 
 
+def test_answers_about_images_that_were_rendered_anew_are_pointed_out(person, experimenter, app):
+    person().begin().answer(1, 1, 1)
+    assert experimenter.get("/dashboard/live.json").json["summary"]["about_other_images"] == 0
+    with app.extensions["database"].write() as db:
+        db.get(Response, 2).image_right_sha256 = "0" * 64
+    live = experimenter.get("/dashboard/live.json").json
+    assert live["summary"]["about_other_images"] == 1 and "1 of these answers are about images" in live["html"]
+
+
 def test_the_dashboard_links_every_image_by_its_hash(experimenter, app):
     text = experimenter.get("/dashboard/").text
     for sha256 in app.extensions["study"].images_by_sha256:
