@@ -11,12 +11,13 @@ from stimuli.heads.subdivide import vertex_normals
 IRIS_RADIUS_MM = 6.2
 CORNEA_RADIUS_MM = 7.8  # of curvature; Gullstrand's schematic eye
 GAZE_YAW_DEG = 17.0  # towards the person's left, where the cameras stand
+LID_CONTACT_MM = 0.3  # the ball is that much larger than the base mesh's, so that the lids lie on it
 RINGS, SEGMENTS = 96, 96
 
 
 def eyeball(ball: Eyeball, yaw_deg: float = GAZE_YAW_DEG) -> Eye:
     """An eye of SEGMENTS x RINGS vertices; rings crowd towards the cornea."""
-    radius, iris = ball.radius, IRIS_RADIUS_MM
+    radius, iris = ball.radius + LID_CONTACT_MM, IRIS_RADIUS_MM
     plane = np.sqrt(radius**2 - iris**2)
     cap = plane - np.sqrt(CORNEA_RADIUS_MM**2 - iris**2)
     theta = np.pi * np.linspace(0, 1, RINGS) ** 1.5 * 0.999 + 1e-4

@@ -44,6 +44,7 @@ CHARACTER: dict[str, float] = {
     "asym/asym-brown-1-l": 0.25, "asym/asym-eye-4-l": 0.15, "asym/asym-nose-1-r": 0.15,
     "asym/asym-mouth-1-l": 0.20, "asym/asym-jaw-1-r": 0.25, "asym/asym-ear-1-l": 0.2,
     "expression/units/caucasian/mouth-compression": 0.12,
+    "expression/units/caucasian/eye-left-opened-up": 0.45, "expression/units/caucasian/eye-right-opened-up": 0.42,
 }
 ARM_DROP_DEG = 32.0
 LEVELS = 2
