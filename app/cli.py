@@ -8,6 +8,7 @@ import click
 VERBS = {
     "render": "app.commands.render",
     "build": "app.commands.build",
+    "strip": "app.commands.strip",
     "serve": "app.commands.serve",
     "simulate": "app.commands.simulate",
     "analyse": "app.commands.analyse",

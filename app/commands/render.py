@@ -47,12 +47,13 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
               help="A parameter of the technique, value in JSON; repeat for more.")
 @click.option("--head", default="default", show_default=True, help="The default head, or a scan as .glb, .gltf or .obj.")
 @click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the scan's coordinates; guessed and said if not given.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="The scan's upward axis; found out and said if not given.")
 @click.option("--supersample", type=click.IntRange(1, 4), default=2, show_default=True, help="Samples a pixel along each side.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of hair, skin noise and baked light.")
 @click.option("--samples", type=click.Path(dir_okay=False, path_type=Path),
               help="Also write the samples of each pixel, .npy, uint8 at the resolution at which scattering is computed; 0 where nothing scatters.")
 @click.option("--contrast", type=click.Path(dir_okay=False, path_type=Path), help="Also write the local contrast as a grey PNG (golubev_plus).")
-def command(technique, framing, size, out, parameters, head, unit, supersample, seed, samples, contrast):
+def command(technique, framing, size, out, parameters, head, unit, up, supersample, seed, samples, contrast):
     """Render one technique at one framing.
 
     Prints where the image went and the mean number of samples over the pixels that scatter.
@@ -74,7 +75,7 @@ def command(technique, framing, size, out, parameters, head, unit, supersample, 
         _writable(contrast, (".png",))
         if not chosen.measures_contrast:
             raise InputError(f"{technique} measures no contrast; expected golubev_plus with --contrast")
-    loaded = load_head(head, unit, seed)
+    loaded = load_head(head, unit, seed, up)
     for note in loaded.notes:
         click.echo(note, err=True)
     with renderer.Renderer(loaded.model, size=size, supersample=supersample, seed=seed) as drawing:

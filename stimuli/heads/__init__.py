@@ -20,10 +20,10 @@ class Head:
     notes: tuple[str, ...] = ()  # what the user should be told, one line each
 
 
-def load_head(name_or_path: str = DEFAULT, unit: str | None = None, seed: int = 0) -> Head:
+def load_head(name_or_path: str = DEFAULT, unit: str | None = None, seed: int = 0, up: str | None = None) -> Head:
     """The default head (fetched on first use), or the scan in a .glb, .gltf or .obj file.
 
-    unit: of a scan's coordinates (mm, cm, m, in), None to guess. seed: of the generated hair.
+    unit: of a scan's coordinates (mm, cm, m, in), up: its upward axis (y, z); None to find out. seed: of the generated hair.
     The eyes of a scan are taken from parts named so, else from proportions.
     Raises stimuli.errors.InputError for a file that cannot be used, and without network and cache.
     """
@@ -36,6 +36,5 @@ def load_head(name_or_path: str = DEFAULT, unit: str | None = None, seed: int = 
     from stimuli.heads.model import scan_model
     from stimuli.heads.scan import read_scan
 
-    scan = read_scan(name_or_path, unit)
-    provenance = {"scan": scan.name, "files": scan.files, "unit": scan.unit, "unit_source": scan.unit_source, "up": scan.up, "up_source": scan.up_source}
-    return Head(scan.name, scan_model(scan), provenance, [], scan.notes)
+    scan = read_scan(name_or_path, unit, up)
+    return Head(scan.name, scan_model(scan), scan.provenance(), [], scan.notes)
