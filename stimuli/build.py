@@ -63,7 +63,7 @@ def build(study: Study, out: str | Path, force: bool = False, progress: bool = F
     from renderer import Renderer
     from stimuli.heads import load_head
 
-    head = load_head(study.head.name, study.head.unit, study.render.seed)
+    head = load_head(study.head.name, study.head.unit, study.render.seed, study.head.up)
     plan = _plan(study, parameters, head.provenance)
     (out / "images").mkdir(parents=True, exist_ok=True)
     kept = set() if force else {s.file for s in plan if _is_finished(out, s, state)}

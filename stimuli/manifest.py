@@ -104,13 +104,10 @@ def _image(entry: Table, study: Study, directory: Path) -> Image:
         parts = PurePosixPath(text)
         return not parts.is_absolute() and ".." not in parts.parts and parts.suffix.lower() in _MEDIA
 
-    def one_of(key: str, names: list[str]) -> str:
-        return entry.take(key, str, f"one of {', '.join(names)}", lambda text: text in names)
-
     file = entry.take("file", str, f"the path of a file inside the study's folder that ends in {', '.join(_MEDIA)}", inside)
     image = Image(
-        framing=one_of("framing", [framing.name for framing in study.framings]),
-        technique=one_of("technique", [condition.name for condition in study.techniques]),
+        framing=entry.one_of("framing", (framing.name for framing in study.framings)),
+        technique=entry.one_of("technique", (condition.name for condition in study.techniques)),
         file=file,
         path=directory / file,
         width=entry.number("width", 1, 65535),

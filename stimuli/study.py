@@ -14,6 +14,8 @@ from stimuli.errors import InputError
 from stimuli.table import Table, refuse_doubles
 
 THESIS = Path(__file__).parent / "studies" / "thesis.toml"
+UNITS = ("mm", "cm", "m", "in")  # of a scan's coordinates
+AXES = ("y", "z")  # that can point upwards in a scan
 _ASKED = ("question", "scale", "familiarity", "consent")
 
 
@@ -71,10 +73,11 @@ class Render:
 
 @dataclass(frozen=True)
 class HeadChoice:
-    """The head: "default" or the file of a scan, and the unit of its coordinates where it is given."""
+    """The head: "default" or the file of a scan; the unit of its coordinates and its upward axis, None to find out."""
 
     name: str
     unit: str | None = None
+    up: str | None = None
 
 
 @dataclass(frozen=True)
@@ -221,5 +224,5 @@ def _size(table: Table) -> tuple[int, int]:
 
 def _head(table: Table, beside: Path) -> HeadChoice:
     name = table.text("name", default="default")
-    unit = table.text("unit", default=None)
-    return HeadChoice(str(beside / name) if Path(name).suffix else name, unit)
+    file = str(beside / name) if Path(name).suffix else name
+    return HeadChoice(file, table.one_of("unit", UNITS, default=None), table.one_of("up", AXES, default=None))

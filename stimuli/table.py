@@ -2,8 +2,9 @@
 
 import difflib
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any, Callable
+from typing import Any
 
 from stimuli.errors import InputError
 
@@ -58,6 +59,11 @@ class Table:
         pattern = r"[a-z0-9]([a-z0-9_-]*[a-z0-9])?"
         expected = "a name of small letters, digits, '-' and '_'"
         return self.take(key, str, expected, lambda value: re.fullmatch(pattern, value) is not None, **options)
+
+    def one_of(self, key: str, values: Iterable[str], **options) -> str:
+        """One of a few texts."""
+        values = list(values)
+        return self.take(key, str, f"one of {', '.join(values)}", lambda value: value in values, **options)
 
     def number(self, key: str, low: int, high: int, **options) -> int:
         """An integer from low to high, both included."""

@@ -16,18 +16,19 @@ import click
 )
 @click.option("--head", help='Head to show instead of the one that STUDY names: "default", or a scan, FILE.glb or FILE.obj.')
 @click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the scan's coordinates; guessed, and said, when not given.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="The scan's upward axis; found out, and said, when not given.")
 @click.option("--force", is_flag=True, help="Render every image anew, also those that are up to date.")
-def command(study: Path, out: Path, head: str | None, unit: str | None, force: bool) -> None:
+def command(study: Path, out: Path, head: str | None, unit: str | None, up: str | None, force: bool) -> None:
     """Render the images of the study defined in STUDY, a TOML file, and write their manifest.
 
     Only what changed since the last build is rendered, and an interrupted build goes on where it stopped.
     """
     from stimuli.build import build
-    from stimuli.study import HeadChoice, load_study
+    from stimuli.study import load_study
 
     definition = load_study(study)
-    if head or unit:
-        definition = replace(definition, head=HeadChoice(head or definition.head.name, unit or definition.head.unit))
+    given = {key: value for key, value in (("name", head), ("unit", unit), ("up", up)) if value}
+    definition = replace(definition, head=replace(definition.head, **given))
     built = build(definition, out, force=force, progress=True)
     for note in built.notes:
         click.echo(note, err=True)

@@ -163,7 +163,7 @@ def fake_renderer(monkeypatch):
         licences=[{"what": "sphere", "licence": "CC0-1.0", "source": "here"}],
         notes=("a sphere has no face",),
     )
-    heads.load_head = lambda name, unit, seed: head
+    heads.load_head = lambda name, unit, seed, up: head
     for module in (renderer, errors, heads):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     for name, value in (("driver", "fake"), ("drawn", []), ("frames", []), ("stop_after", None)):

@@ -47,8 +47,8 @@ def test_record_is_read_back(small_study):
 
 
 def test_head_file_lies_beside_the_study(write_toml):
-    path = write_toml(write_toml().read_text() + '\n[head]\nname = "scan.glb"\nunit = "cm"\n')
-    assert load_study(path).head == HeadChoice(str(path.parent / "scan.glb"), "cm")
+    path = write_toml(write_toml().read_text() + '\n[head]\nname = "scan.glb"\nunit = "cm"\nup = "z"\n')
+    assert load_study(path).head == HeadChoice(str(path.parent / "scan.glb"), "cm", "z")
 
 
 @pytest.mark.parametrize(
@@ -79,6 +79,7 @@ def test_head_file_lies_beside_the_study(write_toml):
             r"scale\[3\]\.value: got 2, expected 1",
         ),
         ("[render]", '[familiarity]\nquestion = "?"\nlabels = ["a", "b"]\n[render]', r"familiarity\.labels: .* 5 texts"),
+        ("[render]", '[head]\nunit = "ft"\n[render]', r"head\.unit: got 'ft', expected one of mm, cm, m, in"),
         ("[render]", '[head]\nname = ""\n[render]', r"head\.name: got ''"),
     ],
 )
