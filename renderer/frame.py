@@ -13,7 +13,7 @@ from renderer.profiles import gaussians
 from renderer.techniques.base import Inputs, Technique
 
 LAMP_MAP = 4096
-EXPOSURE = 0.74
+EXPOSURE = 0.76
 BACKDROP = ((0.115, 0.120, 0.130), (0.022, 0.024, 0.028))  # radiance at the centre and at the edge
 THICKNESS_SCALE = 0.38  # mm of slab per mm of depth-map thickness
 TRANSMISSION_WRAP = 0.10  # E = saturate(wrap + L . -N): 0 is exact, the published shader uses 0.3

@@ -142,11 +142,11 @@ class Studio:
         Lamp("rim", (0.66, 0.40, -0.80), (3.6, 3.6, 3.7), 1.6),
     )
     lobes: tuple[Lobe, ...] = (
-        Lobe((0.85, 0.15, 0.55), 5.0, (0.15, 0.18, 0.22)),  # cool fill from the shadow side
+        Lobe((0.85, 0.15, 0.55), 5.0, (0.115, 0.14, 0.175)),  # cool fill from the shadow side
         Lobe((-0.45, 0.35, 0.85), 7.0, (0.28, 0.265, 0.24)),  # the key's own panel around it
-        Lobe((0.0, 1.0, 0.1), 3.0, (0.24, 0.25, 0.27)),  # overhead
+        Lobe((0.0, 1.0, 0.1), 3.0, (0.20, 0.21, 0.225)),  # overhead
         Lobe((0.0, -1.0, 0.3), 2.0, (0.075, 0.062, 0.05)),  # floor bounce
-        Lobe((-0.24, 0.20, 0.95), 60.0, (6.0, 5.9, 5.7)),  # a small bright panel: the catchlight
+        Lobe((-0.24, 0.20, 0.95), 60.0, (4.6, 4.5, 4.35)),  # a small bright panel: the catchlight
         Lobe((-0.9, 0.1, -0.5), 6.0, (0.18, 0.19, 0.22)),  # back edge
     )
     ambient: tuple[float, float, float] = (0.030, 0.032, 0.036)

@@ -18,5 +18,5 @@ def command(folder: Path, framing: str, crops: tuple[str, ...], out: Path) -> No
     if out.suffix.lower() != ".png" or not out.parent.is_dir():
         raise InputError(f"{out}: expected a file name that ends in .png in a folder that exists")
     sheet = strip(folder, framing, [parse_crop(text) for text in crops])
-    sheet.save(out)
+    sheet.save(out, optimize=True)
     click.echo(f"{out}: {sheet.width}x{sheet.height}")

@@ -29,7 +29,7 @@ void main() {
     float collar = exp(-pow((r - 0.50 - 0.04 * noise(vec3(around * 5.0, 1.0))) / 0.11, 2.0));
     vec3 iris_colour = mix(vec3(0.11, 0.145, 0.135), vec3(0.20, 0.215, 0.17), clamp(0.5 + 0.8 * fibre, 0.0, 1.0));
     iris_colour = mix(iris_colour, vec3(0.26, 0.16, 0.065), 0.65 * collar);
-    iris_colour *= 1.0 - 0.25 * smoothstep(0.0, 0.4, noise(vec3(iris * 9.0, 3.0)) - 0.35);
+    iris_colour *= 1.0 - 0.20 * smoothstep(0.15, 0.85, noise(vec3(iris * 6.0, 3.0)));
     iris_colour *= mix(0.30, 1.0, smoothstep(1.02, 0.80, r));
     iris_colour *= smoothstep(pupil - 0.025, pupil + 0.035, r + 0.008 * noise(vec3(around * 8.0, 2.0)));
 
