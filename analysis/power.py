@@ -1,9 +1,9 @@
 """How many people a study needs, before it is run: simulated participants, the tests of the report, a recorded seed.
 
-A simulated person compares a and b at a framing by d = w_b - w_a + (u_b - u_a) + e, in JOD: w are the worths, u ~ N(0, taste/sqrt 2)
-is the person's own taste, so that tastes for a difference spread by `taste`, and e ~ N(0, SIGMA) with SIGMA = 1/Phi^-1(0.75), so that
-1 JOD is preferred by 75 % (Perez-Ortiz and Mantiuk 2017, arXiv:1712.03686). The answer is 0 where |d| < slight, +-2 where |d| >= clear,
-else +-1. Each question of a person has its own e; tastes hold for all of that person's questions.
+A simulated person compares a and b at a framing by d = w_b - w_a + (u_b - u_a) + e, in JOD: w are the worths, u the person's own
+taste, normal, so that tastes for a difference spread by `taste`, and e the noise of one question. Taste and noise together have the
+standard deviation SIGMA = 1/Phi^-1(0.75), so that over people 1 JOD is preferred by 75 % (Perez-Ortiz and Mantiuk 2017,
+arXiv:1712.03686). The answer is 0 where |d| < slight, +-2 where |d| >= clear, else +-1.
 
 Two goals for one difference D: to *find* it (the truth is D, a two-sided test rejects equality) and to *exclude* it (the truth is 0, two
 one-sided tests, Schuirmann 1987, doi:10.1007/BF01068419, put the difference within +-D). The tests:
@@ -56,18 +56,20 @@ class Answering:
         for name, value in vars(self).items():
             if not (math.isfinite(value) and 0 <= value <= 20):
                 raise InputError(f"{name} is {value!r}, expected JOD from 0 to 20")
+        if self.taste >= SIGMA:
+            raise InputError(f"taste is {self.taste:g} JOD, expected less than {SIGMA:.3f}, the spread of taste and noise together")
         if self.clear < self.slight:
             raise InputError(f"clear is {self.clear:g} and slight {self.slight:g}; expected clear to be at least slight")
 
-    @cached_property
-    def spread(self) -> float:
-        """Standard deviation in JOD of d over people and their noise."""
-        return math.hypot(SIGMA, self.taste)
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the noise of one question, in JOD."""
+        return math.sqrt(SIGMA**2 - self.taste**2)
 
     def shares(self, difference: float | np.ndarray) -> np.ndarray:
         """(..., 5): how often each of the answers -2 to 2 is given about a pair with that true difference in JOD."""
         cuts = np.array([-self.clear, -self.slight, self.slight, self.clear])
-        below = stats.norm.cdf((cuts - np.asarray(difference, float)[..., None]) / self.spread)
+        below = stats.norm.cdf((cuts - np.asarray(difference, float)[..., None]) / SIGMA)
         edges = [np.zeros(below.shape[:-1])[..., None], below, np.ones(below.shape[:-1])[..., None]]
         return np.diff(np.concatenate(edges, axis=-1), axis=-1)
 
@@ -246,11 +248,7 @@ def tost_power(effect: float, margin: float, people: int, alpha: float = 0.05) -
 def fit_pilot(responses: Responses, most: int = 2_000) -> tuple[dict[str, dict[str, float]], Answering]:
     """Assumptions from a pilot: worths in JOD at each framing and the thresholds, by maximum likelihood of the ordered probit
     P(answer) = Phi(cut - difference) pooled over people, symmetric cuts. The taste stays the default: a pilot is too small for it.
-
-    What is estimated is a person's total spread, so that JOD are those of the noise alone: they are scaled by the default taste.
     """
-    taste = Answering().taste
-    spread = math.hypot(SIGMA, taste)
     worths, cuts = {}, []
     for framing, items in responses.items.items():
         rows = responses.frame[responses.frame.framing == framing]
@@ -263,36 +261,44 @@ def fit_pilot(responses: Responses, most: int = 2_000) -> tuple[dict[str, dict[s
         found = _ordered_probit(counts, most)
         if found is None:
             raise InputError(
-                f"the pilot at {framing!r} has no finite worths: a technique was never or always preferred, or no answer or every answer "
-                "is 0; expected more people"
+                f"the pilot at {framing!r} has no finite worths: a technique was never or always preferred, or every answer is 0; "
+                "expected more people"
             )
         fitted, slight, clear = found
-        worths[framing] = dict(zip(items, (fitted * spread).tolist(), strict=True))
-        cuts.append((slight * spread, clear * spread))
+        worths[framing] = dict(zip(items, (fitted * SIGMA).tolist(), strict=True))
+        cuts.append((slight * SIGMA, clear * SIGMA))
     slight, clear = np.mean(cuts, axis=0)
-    return worths, Answering(float(slight), float(clear), taste)
+    return worths, Answering(float(slight), float(clear))
 
 
 def _ordered_probit(counts: np.ndarray, most: int) -> tuple[np.ndarray, float, float] | None:
-    """Worths (n,) centred, and the two cuts, in standard deviations; None where the likelihood has no maximum."""
+    """Worths (n,) centred, and the two cuts, in standard deviations; None where the likelihood has no maximum.
+
+    A kind of answer that nobody gave has its cut at the end of the scale: no 'no difference', slight = 0; no clear one, clear = 10.
+    """
     n = len(counts)
     i, k = np.nonzero(counts.sum(axis=2))
     about = counts[i, k]
-    if about[:, 2].sum() in (0, about.sum()) or not about[:, [0, 4]].sum() or not about[:, [1, 3]].sum():
+    strong, slight, none = about[:, [0, 4]].sum(), about[:, [1, 3]].sum(), about[:, 2].sum()
+    if not strong + slight:
         return None
 
+    def cuts(x: np.ndarray) -> tuple[float, float]:
+        first = np.exp(x[n]) if none else 0.0
+        step = (np.exp(x[n + 1]) if slight else 0.0) if strong else 10.0
+        return first, first + step
+
     def loss(x: np.ndarray) -> float:
-        slight, step = np.exp(x[n:])
-        cuts = np.array([-slight - step, -slight, slight, slight + step])
-        below = stats.norm.cdf(cuts - (x[k] - x[i])[:, None])
+        low, high = cuts(x)
+        below = stats.norm.cdf(np.array([-high, -low, low, high]) - (x[k] - x[i])[:, None])
         shares = np.diff(below, axis=1, prepend=0, append=1)
         return -(about * np.log(np.maximum(shares, 1e-300))).sum() + x[:n].sum() ** 2  # the sum is free: 0
 
-    found = optimize.minimize(loss, np.r_[np.zeros(n), np.log([0.3, 0.9])], method="BFGS", options={"maxiter": most, "gtol": 1e-3})
+    start = np.r_[np.zeros(n), np.log([0.3, 0.9])]
+    found = optimize.minimize(loss, start, method="BFGS", options={"maxiter": most, "gtol": 1e-3})
     if np.abs(found.x[:n]).max() > 5:
         return None
-    slight, step = np.exp(found.x[n:])
-    return found.x[:n] - found.x[:n].mean(), float(slight), float(slight + step)
+    return found.x[:n] - found.x[:n].mean(), *map(float, cuts(found.x))
 
 
 def _connected(met: np.ndarray) -> bool:
@@ -393,7 +399,7 @@ def _answers(plan: Plan, worths: np.ndarray, studies: int, rng: np.random.Genera
     own = rng.standard_normal((studies, plan.most, len(worths)), np.float32) * np.float32(model.taste / math.sqrt(2))
     own += worths.astype(np.float32)
     d = own[..., b] - own[..., a]
-    d += np.float32(SIGMA) * rng.standard_normal(d.shape, np.float32)
+    d += np.float32(model.noise) * rng.standard_normal(d.shape, np.float32)
     size = np.abs(d)
     return (np.sign(d) * ((size >= model.slight).astype(np.int8) + (size >= model.clear))).astype(np.int8)
 
@@ -477,3 +483,103 @@ def _wilson(share: float, n: int, z: float = 1.959964) -> tuple[float, float]:
     """95 % interval of a share of n (Wilson 1927)."""
     middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
     return max(0.0, (middle - half) / (1 + z * z / n)), min(1.0, (middle + half) / (1 + z * z / n))
+
+
+def power_files(
+    plan: Plan, curves: pd.DataFrame, needed: pd.DataFrame, codebook: object, source: str, command: str = ""
+) -> tuple[dict[str, bytes], list[str]]:
+    """The files of a plan (tables marked as simulated, a figure, power.md) and what they say in short, a sentence each."""
+    from .worth_figures import TEST_STYLES, draw_power
+
+    a, b = (codebook.label(name) for name in plan.pair)
+    correction = "none"
+    framing = curves.framing.iloc[0]
+    picture = draw_power(
+        curves[(curves.framing == framing) & (curves.correction == correction)], plan.power, plan.difference, correction, codebook
+    )
+    sentences = []
+    for (where, design, goal), rows in needed.groupby(["framing", "design", "goal"], sort=False):
+        place = "" if where == "any" else f"{codebook.framing_label(where)}, "
+        each = int(rows.answers_each.iloc[0])
+        parts = []
+        for test in [name for name in ("worths", "wilcoxon", "mean") if name in set(rows.test)]:
+            if goal == "find" and test == "mean":
+                continue
+            counts = rows[rows.test == test].set_index("correction").people
+            words = [f"more than {plan.most}" if math.isnan(count) else f"{count:.0f}" for count in counts]
+            parts.append(f"{words[0]} by {TEST_STYLES[test][0]}" + (f" ({words[1]} in the family)" if len(words) > 1 else ""))
+        sentences.append(
+            f"{place}{design} design, {each} of {len(plan.pairs)} pairs a person and framing: to {goal} {plan.difference:g} JOD between "
+            f"{a} and {b} with a power of {plan.power:g} takes this many people: {', '.join(parts)}."
+        )
+    files = {
+        "power.csv": _csv(curves.assign(simulated=1)),
+        "needed.csv": _csv(needed.assign(simulated=1)),
+        "power.md": _markdown(plan, needed, sentences, codebook, source, command).encode(),
+    } | picture.files
+    return files, sentences
+
+
+def _csv(table: pd.DataFrame) -> bytes:
+    return table.to_csv(index=False, float_format="%.6g", lineterminator="\n").encode()
+
+
+def _markdown(plan: Plan, needed: pd.DataFrame, sentences: list[str], codebook: object, source: str, command: str) -> str:
+    """The page to read: in short, what is needed, what was assumed."""
+    from .worth_figures import TEST_STYLES
+
+    model = plan.answering
+    lines = ["# How many people", "", "**SIMULATED ANSWERS.** Every participant on this page is a program.", ""]
+    lines += [f"- {sentence}" for sentence in sentences]
+    lines += ["", "## People needed", "", "| framing | design | goal | test | correction | people | power | false alarms |"]
+    lines += ["|---|---|---|---|---|--:|--:|--:|"]
+    for row in needed.itertuples():
+        people = f"more than {plan.most}" if math.isnan(row.people) else f"{int(row.people)}"
+        where = row.framing if row.framing == "any" else codebook.framing_label(row.framing)
+        lines.append(
+            f"| {where} | {row.design} | {row.goal} | {TEST_STYLES[row.test][0]} | {row.correction} | {people} | {row.power:.3f} | "
+            f"{row.false_alarms:.3f} |"
+        )
+    lines += [
+        "",
+        f"`none`: the test alone, at alpha {plan.alpha:g}, for one comparison planned before. `family`: Holm's first step for "
+        f"{plan.family} tests, alpha/{plan.family};",
+        "its later steps ask less, so that `family` needs at most so many people.",
+        "",
+        "False alarms: how often a study of that size (of the largest one where more people are needed) reaches the goal when the truth",
+        "is the opposite: it finds a difference where there is none, or excludes one that is there.",
+        "",
+        "![Power against people](figures/power.svg)",
+        "",
+        "## What was assumed",
+        "",
+        f"- Worths in JOD, {source}; the pair set {plan.difference:g} apart about its middle, or 0 apart to exclude:",
+    ]
+    for framing in plan.worths or ("any",):
+        worths = plan.truth(framing, plan.difference)
+        listed = ", ".join(f"{codebook.label(name)} {worth:z.2f}" for name, worth in zip(plan.techniques, worths, strict=True))
+        lines.append(f"  - {'every framing' if framing == 'any' else codebook.framing_label(framing)}: {listed}")
+    share = stats.norm.cdf(plan.difference / SIGMA)
+    tied = model.shares(plan.difference)[2]
+    lines += [
+        f"- Were there no ties, {100 * share:.0f} % of answers would prefer the better one at {plan.difference:g} JOD; "
+        f"{100 * tied:.0f} % see no difference.",
+        f"- No difference is seen below {model.slight:.2f} JOD, a preference is clear from {model.clear:.2f} JOD on; people's tastes for",
+        f"  a difference spread by {model.taste:.2f} JOD (standard deviation).",
+        "- To exclude, the margin is the difference as it shows on the scale of the answers, and the test is two one-sided t tests.",
+        f"- {plan.studies} simulated studies for each framing, design and truth; alpha {plan.alpha:g}, power {plan.power:g}, "
+        f"seed {plan.seed}.",
+        f"- numpy {np.__version__}, scipy {_version('scipy')}, subdermal {_version('subdermal')}.",
+    ]
+    if command:
+        lines += ["", f"    {command}"]
+    return "\n".join(lines) + "\n"
+
+
+def _version(name: str) -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed as a package"

@@ -9,6 +9,7 @@ VERBS = {
     "render": "app.commands.render",
     "build": "app.commands.build",
     "strip": "app.commands.strip",
+    "power": "app.commands.power",
     "serve": "app.commands.serve",
     "simulate": "app.commands.simulate",
     "analyse": "app.commands.analyse",
