@@ -1,8 +1,8 @@
 """The definition of a study: what is shown, what is asked, how it is rendered.
 
 A study is a TOML file (studies/thesis.toml is the one to copy). What it asks (`question`, `scale`,
-`familiarity`, `consent`) may be left out and is then asked as in the thesis. Nothing here renders, and
-nothing here knows which techniques and framings there are: `stimuli.build` asks the renderer.
+`familiarity`, `consent`) may be left out and is then asked as in the thesis; what it declares of its analysis
+(`analysis`: margins, tests, exclusions) may be left out too. Nothing here renders, and nothing here knows which techniques and framings there are: `stimuli.build` asks the renderer.
 """
 
 import tomllib
@@ -82,7 +82,7 @@ class HeadChoice:
 
 @dataclass(frozen=True)
 class Study:
-    """A study. `render` and `head` are None where the images are ready-made."""
+    """A study. `render` and `head` are None where the images are ready-made; `analysis` is what it declares of its analysis."""
 
     name: str
     title: str
@@ -96,6 +96,7 @@ class Study:
     consent: str
     render: Render | None = None
     head: HeadChoice | None = None
+    analysis: dict = field(default_factory=dict)
 
     def record(self) -> dict:
         """What the manifest says of the study; `read_study` reads it back."""
@@ -110,6 +111,7 @@ class Study:
             "scale": [vars(level) for level in self.scale],
             "familiarity": {"question": self.familiarity.question, "labels": list(self.familiarity.labels)},
             "consent": self.consent,
+            **({"analysis": self.analysis} if self.analysis else {}),
         }
 
 
@@ -152,6 +154,7 @@ def read_study(table: Table, render: Render | None = None, head: HeadChoice | No
         consent=asked.text("consent"),
         render=render,
         head=head,
+        analysis=_analysis(table.table("analysis", default={})),
     )
     for group in (framings, techniques):
         refuse_doubles(group, "name")
@@ -213,6 +216,32 @@ def _familiarity(table: Table) -> Familiarity:
     familiarity = Familiarity(table.text("question"), tuple(labels))
     table.end()
     return familiarity
+
+
+def _analysis(table: Table) -> dict:
+    """What the study declares of its analysis before anybody is asked, as `analysis.options` names it; a rule that is false is off."""
+
+    def number(of: Table, key: str, low: float, high: float, off: bool = False) -> None:
+        def valid(value: float | bool) -> bool:
+            return (off and value is False) or (not isinstance(value, bool) and low <= value <= high)
+
+        of.take(key, (int, float), f"a number from {low:g} to {high:g}" + (" or false" if off else ""), valid, default=0)
+
+    number(table, "margin", 0.001, 4)
+    number(table, "margin_jod", 0.001, 20)
+    number(table, "level", 0.501, 0.999)
+    table.number("resamples", 100, 1_000_000, default=0)
+    table.number("seed", 0, 2**63 - 1, default=0)
+    for key, known in (("test", ("wilcoxon", "sign")), ("family", ("study", "framing")), ("ties", ("half", "drop"))):
+        table.take(key, str, f"one of {', '.join(known)}", lambda text, known=known: text in known, default=known[0])
+    rules = table.table("exclusions", default={})
+    for key in ("answered_share", "one_side_share", "same_answer_share", "repeat_share"):
+        number(rules, key, 0, 1, off=True)
+    number(rules, "median_rt_ms", 0, 1e9, off=True)
+    number(rules, "zeta", -1, 1, off=True)
+    rules.end()
+    table.end()
+    return table.value
 
 
 def _size(table: Table) -> tuple[int, int]:

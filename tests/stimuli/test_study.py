@@ -46,6 +46,13 @@ def test_record_is_read_back(small_study):
     assert isinstance(again, Study) and again.render is None and again.head is None
 
 
+def test_what_is_declared_of_the_analysis_is_kept_as_written(small_study, write_toml):
+    assert small_study.analysis == {} and "analysis" not in small_study.record()
+    study = load_study(write_toml(write_toml().read_text() + "\n[analysis]\nmargin = 0.3\n[analysis.exclusions]\nzeta = false\n"))
+    assert study.analysis == {"margin": 0.3, "exclusions": {"zeta": False}}
+    assert read_study(Table(study.record(), "manifest")).analysis == study.analysis
+
+
 def test_head_file_lies_beside_the_study(write_toml):
     path = write_toml(write_toml().read_text() + '\n[head]\nname = "scan.glb"\nunit = "cm"\nup = "z"\n')
     assert load_study(path).head == HeadChoice(str(path.parent / "scan.glb"), "cm", "z")
@@ -81,6 +88,12 @@ def test_head_file_lies_beside_the_study(write_toml):
         ("[render]", '[familiarity]\nquestion = "?"\nlabels = ["a", "b"]\n[render]', r"familiarity\.labels: .* 5 texts"),
         ("[render]", '[head]\nunit = "ft"\n[render]', r"head\.unit: got 'ft', expected one of mm, cm, m, in"),
         ("[render]", '[head]\nname = ""\n[render]', r"head\.name: got ''"),
+        ("[render]", "[analysis]\nmargins = 1\n[render]", r"analysis\.margins: unknown key, did you mean 'margin'"),
+        ("[render]", "[analysis]\nmargin = 0\n[render]", r"analysis\.margin: got 0, expected a number from 0\.001 to 4"),
+        ("[render]", "[analysis]\nmargin = true\n[render]", r"analysis\.margin: got True, expected a number"),
+        ("[render]", '[analysis]\ntest = "t"\n[render]', r"analysis\.test: got 't', expected one of wilcoxon, sign"),
+        ("[render]", "[analysis.exclusions]\nzeta = 2\n[render]", r"analysis\.exclusions\.zeta: got 2, expected a number from -1 to 1"),
+        ("[render]", "[analysis.exclusions]\nspeed = 2\n[render]", r"analysis\.exclusions\.speed: unknown key"),
     ],
 )
 def test_faults_are_named(write_toml, old, new, message):
