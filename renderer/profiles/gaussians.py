@@ -6,7 +6,14 @@ figure 14-13; three-layer skin. Each column of weights sums to 1: the surface's 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
 import numpy as np
+
+from renderer.medium import Stack
+from renderer.profiles.model import Profile, radii
 
 SKIN_VARIANCE_MM2 = np.array([0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41])
 SKIN_WEIGHTS = np.array([  # rows: Gaussians, columns: R, G, B
@@ -51,3 +58,122 @@ def transmittance(thickness_mm: np.ndarray, published: bool = False, variance=SK
     """
     d = np.asarray(thickness_mm, dtype=float)[..., None]
     return np.exp(-d**2 / ((1 if published else 2) * variance)) @ weights
+
+
+def radial_error(r_mm, target, approximation) -> np.ndarray:
+    """E = sqrt(int r (R - G)^2 dr) / sqrt(int r R^2 dr) per channel (seeds/000 eq. 3.1): (N,), (N, C), (N, C) -> (C,)."""
+    r = np.asarray(r_mm, dtype=float)[:, None]
+    return np.sqrt(np.trapezoid(r * (target - approximation) ** 2, r, axis=0) / np.trapezoid(r * target**2, r, axis=0))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A sum of Gaussians: variance_mm2 (K,), weights (K,) >= 0, their prescribed sum, and the error of eq. 3.1."""
+
+    variance_mm2: np.ndarray
+    weights: np.ndarray
+    error: float
+
+    def reflectance(self, r_mm) -> np.ndarray:
+        """(N,) -> (N,), 1/mm^2."""
+        return reflectance(r_mm, self.variance_mm2, self.weights)
+
+
+def fit(r_mm, target, terms: int, total: float) -> Fit:
+    """The best sum of `terms` Gaussians with weights >= 0 that sum to `total`, by the error of eq. 3.1.
+
+    r_mm (N,): increasing, from near 0 to where the profile is spent; target (N,): R(r), 1/mm^2. d'Eon, Luebke and Enderton
+    2007, "Efficient rendering of human skin", sec. 5: min int r (R - G)^2 dr over weights and variances. Weights are solved for at
+    each step (least squares under the constraints), variances by Levenberg and Marquardt from several starts.
+    """
+    from scipy.optimize import least_squares, nnls
+
+    from renderer.errors import InputError
+
+    r, target = np.asarray(r_mm, dtype=float), np.asarray(target, dtype=float)
+    if isinstance(terms, bool) or not isinstance(terms, (int, np.integer)) or not 1 <= terms <= 20:
+        raise InputError(f"terms is {terms!r}; expected a whole number of Gaussians, 1 to 20")
+    if r.ndim != 1 or r.shape != target.shape or len(r) < 4 * terms or not (np.diff(r) > 0).all() or r[0] < 0:
+        raise InputError(f"expected increasing radii and as many values, at least {4 * terms} for {terms} Gaussians")
+    if not (np.isfinite(target).all() and np.isfinite(total) and total > 0):
+        raise InputError("a profile to fit has to be finite with a positive total")
+    root = np.sqrt(np.gradient(r) * r)  # weights of the trapezium rule in int r (...)^2 dr
+    scale = np.linalg.norm(root * target)
+    goal = root * target / scale
+
+    def basis(log_v):
+        v = np.exp(log_v)
+        return root[:, None] * np.exp(-(r[:, None] ** 2) / (2 * v)) / (2 * np.pi * v) / scale
+
+    heavy = 1e3  # the sum is a row of its own in the non-negative problem, then exact by rescaling
+
+    def weights(log_v):
+        columns = basis(log_v)
+        w = nnls(np.vstack([columns * total, heavy * np.ones(len(log_v))]), np.append(goal, heavy))[0]
+        return w / w.sum() * total
+
+    def residual(log_v):
+        log_v = np.clip(log_v, *bounds)
+        return basis(log_v) @ weights(log_v) - goal
+
+    energy = np.cumsum(r * target * np.gradient(r))
+    r_low, r_high = np.interp([0.02, 0.995], energy / energy[-1], r)
+    bounds = np.log(np.array([max(r_low, r[1]) ** 2 / 200, r_high**2 * 20]))
+    best = None
+    for low, high in ((0.25, 0.5), (0.1, 1.0), (0.5, 0.35)):
+        start = np.log(np.geomspace((low * r_low) ** 2, (high * r_high) ** 2, terms) if terms > 1 else np.array([low * r_low * high * r_high]))
+        found = least_squares(residual, np.clip(start, *bounds), method="trf", x_scale=1.0, max_nfev=200, diff_step=1e-5)
+        if best is None or found.cost < best.cost:
+            best = found
+    log_v = np.sort(np.clip(best.x, *bounds))
+    w = weights(log_v)
+    variance = np.exp(log_v)
+    got = reflectance(r, variance, w)
+    return Fit(variance, w, float(radial_error(r, target[:, None], got[:, None])[0]))
+
+
+@dataclass(frozen=True)
+class GaussianSum(Profile):
+    """The profile of a model as a sum of `terms` Gaussians a channel, total kept. model: dipole (for a stack of several layers: layered).
+
+    T(r) = R(sqrt(r^2 + thickness^2)), Jimenez et al. 2010. d'Eon and Luebke's published skin is SKIN_WEIGHTS, not a medium.
+    """
+
+    terms: int = 6
+    model: str = "dipole"
+
+    name: ClassVar[str] = "gaussian_sum"
+    paper: ClassVar[str] = "d'Eon and Luebke 2007"
+    layers: ClassVar[int] = 0
+    knows_thickness: ClassVar[bool] = False
+
+    def fits(self) -> list[Fit]:
+        """One fit a channel."""
+        return _fits(self.stack, self.model, self.terms)
+
+    def reflectance(self, r_mm):
+        r = radii(r_mm)[:, 0]
+        return np.stack([f.reflectance(r) for f in self.fits()], axis=-1)
+
+    def transmittance(self, r_mm):
+        if np.isinf(self.stack.thickness_mm):
+            return np.zeros((len(radii(r_mm)), self.stack.channels))
+        return self.reflectance(np.hypot(radii(r_mm)[:, 0], self.stack.thickness_mm))
+
+    def totals(self):
+        fits, d = self.fits(), np.array([self.stack.thickness_mm])
+        through = [transmittance(d, False, f.variance_mm2, f.weights)[0] for f in fits]
+        return np.array([f.weights.sum() for f in fits]), np.array(through)
+
+
+@lru_cache(maxsize=32)
+def _fits(stack: Stack, model: str, terms: int) -> list[Fit]:
+    from renderer.profiles import models
+
+    source = models.make("layered" if model == "dipole" and len(stack.layers) > 1 else model, stack)
+    totals = source.totals()[0]
+    out = []
+    for channel in range(stack.channels):
+        r = models.fit_radii(stack, channel)
+        out.append(fit(r, source.reflectance(r)[:, channel], terms, float(totals[channel])))
+    return out

@@ -15,45 +15,10 @@ from OpenGL import GL
 
 from renderer import gl
 from renderer.errors import InputError
-from renderer.profiles import gaussians
+from renderer.profiles.separable import demo_kernel, preintegrated_kernel
 from renderer.techniques.base import Inputs, Scattered, Technique, output_formats, parameter
 
 MOST_TAPS = 41
-
-
-def tap_offsets(taps: int, reach: float) -> np.ndarray:
-    """Offsets in [-reach, reach], dense at the centre: reach * sign(o) o^2, o uniform in [-1, 1]: (taps,)."""
-    o = np.linspace(-1, 1, taps)
-    return reach * np.sign(o) * o**2
-
-
-def demo_kernel(taps: int, strength=(0.48, 0.41, 0.28), falloff=(1.0, 0.37, 0.3)) -> tuple[np.ndarray, np.ndarray]:
-    """Offsets (taps,) and weights (taps, 3) of the code published with the 2012 report ("Separable SSS" demo).
-
-    A radial slice of five of the six Gaussians with the red weights for all channels, stretched per channel by
-    `falloff` and blended with the centre by `strength`.
-    """
-    offsets = tap_offsets(taps, 3.0 if taps > 20 else 2.0)
-    r = np.abs(offsets)[:, None] / (0.001 + np.array(falloff))
-    profile = sum(w * np.exp(-r**2 / (2 * v)) / (2 * 3.14 * v)
-                  for w, v in zip(gaussians.SKIN_WEIGHTS[1:, 0], gaussians.SKIN_VARIANCE_MM2[1:], strict=True))
-    gap = np.abs(np.diff(offsets))
-    area = 0.5 * (np.append(0, gap) + np.append(gap, 0))[:, None]
-    weights = area * profile
-    weights /= weights.sum(axis=0)
-    strength = np.array(strength)
-    centre = taps // 2
-    weights *= strength
-    weights[centre] += 1 - strength
-    return offsets, weights
-
-
-def preintegrated_kernel(taps: int, reach_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Offsets (taps,) mm and weights (taps, 3): a_p(x) of skin's six Gaussians, integrated over each tap's interval."""
-    offsets = tap_offsets(taps, reach_mm)
-    middle = 0.5 * (offsets[1:] + offsets[:-1])
-    edges = np.concatenate([[-np.inf], middle, [np.inf]])
-    return offsets, gaussians.line_integral(edges[:-1], edges[1:])
 
 
 @dataclass(frozen=True)
