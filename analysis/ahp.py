@@ -14,13 +14,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from . import bootstrap
 from .errors import InputError
+from .options import Options
+from .panel import Panel, by_pair, noted, panels
 from .responses import Responses
 
 #: Random index for matrices of 1 to 10 items; Saaty's, as in table 5.3 of the thesis. Other tools hold others (n = 3: .525, .58).
 RANDOM_INDEX = (0.0, 0.0, 0.52, 0.90, 1.12, 1.24, 1.32, 1.41, 1.45, 1.49)
 #: How far a_ik * a_ki may be from 1 in a matrix that was printed with few digits.
 RECIPROCAL_TOLERANCE = 0.02
+#: How people's judgements of a pair become one: see `aggregated`.
+AGGREGATIONS = ("median", "geometric_mean")
 
 
 @dataclass(frozen=True)
@@ -126,6 +131,111 @@ def priorities_table(comparisons: Mapping[str, Comparison]) -> pd.DataFrame:
             for name, priority in zip(comparison.items, found.vector, strict=True)
         ]
     return pd.DataFrame(rows, columns=["framing", "technique", "priority", "lambda_max", "ci", "cr"])
+
+
+def row_geometric_mean(matrix: np.ndarray) -> np.ndarray:
+    """matrix (..., n, n) -> (..., n): the geometric mean of each row, scaled to sum 1 (Crawford and Williams 1985)."""
+    logs = np.log(np.asarray(matrix, float)).mean(axis=-1)
+    weight = np.exp(logs - logs.max(axis=-1, keepdims=True))
+    return weight / weight.sum(axis=-1, keepdims=True)
+
+
+def look_again(comparison: Comparison) -> tuple[str, str, float, float] | None:
+    """a, b, the judgement of a over b, and what the other judgements imply: the one that departs most from the priorities.
+
+    The largest |log(a_ij w_j/w_i)| (Saaty 2003, doi:10.1016/S0377-2217(02)00227-8); None where all agree or a pair is missing.
+    """
+    if comparison.missing or len(comparison.items) < 3:
+        return None
+    vector = priorities(comparison.matrix).vector
+    implied = vector[:, None] / vector
+    off = np.triu(np.abs(np.log(comparison.matrix / implied)), 1)
+    i, j = np.unravel_index(np.argmax(off), off.shape)
+    if off[i, j] < 1e-9:
+        return None
+    return comparison.items[i], comparison.items[j], float(comparison.matrix[i, j]), float(implied[i, j])
+
+
+def aggregated(panel: Panel, counts: np.ndarray, aggregation: str) -> np.ndarray:
+    """counts (..., K, 5) -> (..., n, n): matrices of 'median' or 'geometric_mean' judgements, NaN where a pair has no answer.
+
+    The median is taken above the diagonal and inverted below, as in `comparisons`; the geometric mean needs no such rule.
+    """
+    counts = by_pair(panel, counts)
+    scale = judgements(np.arange(-2, 3))
+    if aggregation == "median":
+        above = bootstrap.median(counts, scale)
+    else:
+        n = counts.sum(axis=-1)
+        above = np.exp(np.divide(counts @ np.log(scale), n, out=np.full(n.shape, np.nan), where=n > 0))
+    items = len(panel.items)
+    i, j = np.triu_indices(items, 1)
+    matrix = np.ones((*above.shape[:-1], items, items))
+    matrix[..., i, j], matrix[..., j, i] = above, 1 / above
+    return matrix
+
+
+def priority_intervals(responses: Responses, options: Options) -> pd.DataFrame:
+    """framing, aggregation, method, technique, priority, low, high; empty numbers where a pair has no answer.
+
+    aggregation: 'median' (the thesis's) or 'geometric_mean' of people's judgements; method: 'eigenvector' or 'row_geometric_mean'.
+    """
+    rows, notes = [], bootstrap.few(responses)
+    for name, panel in panels(responses).items():
+        for aggregation in AGGREGATIONS:
+            matrix, drawn = _matrices(panel, aggregation, options)
+            if np.isnan(matrix).any():
+                notes.append(f"{name}: no priorities: a pair has no answer")
+            for method, solve in (("eigenvector", lambda one: _principal(one)[0]), ("row_geometric_mean", row_geometric_mean)):
+                low, high = bootstrap.interval(solve(drawn), panel.people, options.level)
+                values = zip(panel.items, solve(matrix), low, high, strict=True)
+                rows += [(name, aggregation, method, *value) for value in values]
+    return noted(rows, ["framing", "aggregation", "method", "technique", "priority", "low", "high"], notes)
+
+
+def consistency_intervals(responses: Responses, options: Options) -> pd.DataFrame:
+    """framing, aggregation, ci, ci_low, ci_high, cr, cr_low, cr_high, a, b, judgement, consistent.
+
+    a, b, judgement, consistent: where CR is at least 0.1, the judgement to look at again and what the others imply; else empty.
+    cr is empty beyond 10 techniques, where there is no random index.
+    """
+    columns = ["framing", "aggregation", "ci", "ci_low", "ci_high", "cr", "cr_low", "cr_high", "a", "b", "judgement", "consistent"]
+    rows, notes = [], bootstrap.few(responses)
+    for name, panel in panels(responses).items():
+        n = len(panel.items)
+        index = RANDOM_INDEX[n - 1] if n <= len(RANDOM_INDEX) else np.nan
+        if n > len(RANDOM_INDEX):
+            notes.append(f"{name}: no consistency ratio: there is no random index beyond {len(RANDOM_INDEX)} items, got {n}")
+        for aggregation in AGGREGATIONS:
+            matrix, drawn = _matrices(panel, aggregation, options)
+            ci = _index(matrix)
+            bounds = bootstrap.interval(_index(drawn), panel.people, options.level)
+            ratio = [float(one) / index if index else float(one) for one in (ci, *bounds)]
+            again = look_again(Comparison(panel.items, matrix)) if ratio[0] >= 0.1 else None
+            rows.append((name, aggregation, float(ci), *map(float, bounds), *ratio, *(again or ("", "", np.nan, np.nan))))
+    return noted(rows, columns, notes)
+
+
+def _matrices(panel: Panel, aggregation: str, options: Options) -> tuple[np.ndarray, np.ndarray]:
+    return tuple(aggregated(panel, counts, aggregation) for counts in (panel.counts, bootstrap.counts(panel, options)))
+
+
+def _principal(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """matrix (..., n, n) -> principal eigenvectors (..., n), sum 1, and eigenvalues (...); NaN where a matrix has one."""
+    whole = np.isfinite(matrix).all(axis=(-2, -1))
+    values, vectors = np.linalg.eig(np.where(whole[..., None, None], matrix, 1.0))
+    top = np.argmax(values.real, axis=-1)[..., None]
+    vector = np.abs(np.take_along_axis(vectors, top[..., None, :], axis=-1)[..., 0].real)
+    vector = np.where(whole[..., None], vector / vector.sum(axis=-1, keepdims=True), np.nan)
+    return vector, np.where(whole, np.take_along_axis(values.real, top, axis=-1)[..., 0], np.nan)
+
+
+def _index(matrix: np.ndarray) -> np.ndarray:
+    """matrix (..., n, n) -> (...): the consistency index, 0 for one or two items."""
+    n = matrix.shape[-1]
+    if n < 3:
+        return np.where(np.isfinite(matrix).all(axis=(-2, -1)), 0.0, np.nan)
+    return np.maximum((_principal(matrix)[1] - n) / (n - 1), 0.0)
 
 
 def read_matrices(path: str | Path) -> dict[str, Comparison]:

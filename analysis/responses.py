@@ -9,7 +9,7 @@ import csv
 import hashlib
 import io
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from .errors import InputError
 
 REQUIRED = ("participant", "familiarity", "framing", "left", "right", "answer", "order", "rt_ms", "started_at")
 OPTIONAL = ("simulated", "study", "study_version")
+REPEATS = ("participant", "framing", "a", "b", "preference", "first_preference")
 
 _INTEGER = r"[+-]?[0-9]{1,9}(?:\.0*)?"
 _NUMBER = r"\+?[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,2})?"
@@ -60,6 +61,9 @@ class Responses:
         rt_ms           float64, milliseconds
         started_at      datetime, UTC
         line            int64, where the row begins in the file
+
+    repeats has one row for each question that a participant was asked again (the same pair under another `order`; it is not counted):
+        participant, framing, a, b, preference (the later answer), first_preference (the one that counts)
     """
 
     frame: pd.DataFrame
@@ -70,6 +74,7 @@ class Responses:
     rows: int = 0
     source: str = ""
     sha256: str = ""
+    repeats: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=REPEATS))
 
     @cached_property
     def items(self) -> dict[str, tuple[str, ...]]:
@@ -207,9 +212,12 @@ def _tidy(
     frame = _oriented(frame, codebook)
     key = ["participant", "framing", "a", "b"]
     again = frame.duplicated(key)
+    asked_again = {}
     if again.any():
-        firsts = frame.drop_duplicates(key)[[*key, "line"]].rename(columns={"line": "first"})
+        firsts = frame.drop_duplicates(key)[[*key, "line", "order", "preference"]]
+        firsts = firsts.rename(columns={"line": "first", "order": "first_order", "preference": "first_preference"})
         repeats = frame[again].merge(firsts, on=key)
+        asked_again = {"repeats": repeats.loc[repeats.order != repeats.first_order, list(REPEATS)].reset_index(drop=True)}
         findings += [
             _finding(
                 row.line,
@@ -232,6 +240,7 @@ def _tidy(
         rows=rows,
         source=Path(name).name,
         sha256=sha256,
+        **asked_again,
     )
 
 

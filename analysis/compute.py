@@ -1,0 +1,73 @@
+"""Every statistic of a study in one call: tables with fixed columns, and notes that say what was refused and which variant was used.
+
+    from analysis import read_responses
+    from analysis.compute import everything
+    results = everything(read_responses("responses.csv"))
+    results.tables["worths"]            # a DataFrame
+    results.notes["worths"]             # what is not in it, and why
+
+Numbers that do not exist are empty (NaN), and a note names the reason. Intervals are at `Options.level`; unless a table says
+otherwise they come from a bootstrap over participants (`analysis.bootstrap`). Preferences run from -2 (strong for a) over 0 to
+2 (strong for b). The framing 'overall' holds all framings together, where there are several.
+
+    tallies         framing,technique,score,low,high                                            points, see analysis.tallies
+    pair_medians    framing,a,b,n,median_preference,low,high
+    ahp_intervals   framing,aggregation,method,technique,priority,low,high                      aggregation median|geometric_mean,
+                                                                                                method eigenvector|row_geometric_mean
+    ahp_consistency framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,judgement,consistent
+                                                                                                a,b: the judgement to look at again,
+                                                                                                'consistent' what the others imply
+    worths          framing,model,technique,estimate,low,high                                   centred on 0 within a framing
+    worth_models    framing,model,parameter,estimate,low,high                                   ties, side effect, spread of people
+    pairs           framing,a,b,n,strong_a,slight_a,none,slight_b,strong_b,wilcoxon_p,sign_p,holm_p,tost_p,wilcoxon_method,
+                    mean_preference,low,high,equivalence_low,equivalence_high,tost_holm_p,equivalent,
+                    rank_biserial,dz,jod,jod_low,jod_high,jod_equivalent                        jod: worth of b less worth of a
+    trend           statistic,value,low,high,p                                                  preference against distance
+    agreement       framing,statistic,value,low,high,p
+    participants    participant,familiarity,answers,left,none,right,side_p,same_answer_share,median_rt_ms,circular_triads,
+                    zeta,repeats,repeat_share,agreement_with_others,excluded                    excluded: the rule that fires, or ''
+    sensitivity     framing,conclusion,a,b,everyone,without_excluded,changed                    with and without the excluded
+    familiarity_interaction framing,technique,n,slope,low,high,spearman,p,holm_p,detectable     detectable: the correlation found
+                                                                                                with a power of 0.8
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import pandas as pd
+
+from . import agreement, ahp, bootstrap, inference, worth
+from .options import Options
+from .responses import Responses
+
+
+@dataclass(frozen=True)
+class Results:
+    """tables: name -> DataFrame; notes: name -> lines; options: what was chosen; see the module for the columns."""
+
+    tables: Mapping[str, pd.DataFrame]
+    notes: Mapping[str, tuple[str, ...]]
+    options: Options
+
+
+def everything(responses: Responses, options: Options | None = None) -> Results:
+    """All tables of this module's docstring. Deterministic: the same answers and options give the same bytes."""
+    options = options or Options()
+    tables = {
+        "tallies": bootstrap.score_intervals(responses, options),
+        "pair_medians": bootstrap.median_intervals(responses, options),
+        "ahp_intervals": ahp.priority_intervals(responses, options),
+        "ahp_consistency": ahp.consistency_intervals(responses, options),
+        "worths": worth.worths(responses, options),
+        "worth_models": worth.parameters(responses, options),
+        "pairs": inference.pairs(responses, options),
+        "trend": inference.trend(responses, options),
+        "agreement": agreement.agreement(responses, options),
+        "participants": agreement.participants(responses, options),
+        "sensitivity": agreement.sensitivity(responses, options),
+        "familiarity_interaction": inference.familiarity_interaction(responses, options),
+    }
+    notes = {name: table.attrs.get("notes", ()) for name, table in tables.items()}
+    return Results(tables, notes, options)
