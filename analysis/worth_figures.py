@@ -34,12 +34,14 @@ VERDICTS = {
     "both": ("different, and within the margin", GREEN, "D"),
     "undecided": ("undecided", "#8A8A8A", "x"),
 }
-STATISTICS = {
+#: Statistics of agreement.csv that are drawn: 1 is perfect, 0 is chance.
+DRAWN = {
     "zeta": "consistency of people (zeta)",
-    "zeta_pooled": "consistency of the pooled answers (zeta)",
-    "kendall_u": "agreement between people (Kendall's u)",
-    "krippendorff_alpha": "agreement between people (Krippendorff's alpha)",
-    "repeat_share": "same direction when asked again",
+    "zeta_guessed": "zeta, ties by a coin",
+    "pooled_zeta": "zeta of the majority",
+    "kendall_u": "agreement: Kendall's u",
+    "krippendorff_alpha": "agreement: Krippendorff's alpha",
+    "repeat_share": "same preference when asked again",
 }
 
 
@@ -49,7 +51,8 @@ def framing_label(codebook: Codebook, name: str) -> str:
 
 def verdict(row: object, alpha: float) -> str:
     """What a row of pairs.csv comes to, as a key of `VERDICTS`."""
-    differs, equal = row.holm_p <= alpha, row.equivalent is True or row.equivalent == 1
+    differs = row.holm_p <= alpha
+    equal = (row.equivalent if np.isfinite(row.equivalent) else row.jod_equivalent) == 1
     return "both" if differs and equal else "different" if differs else "equivalent" if equal else "undecided"
 
 
@@ -76,8 +79,8 @@ def draw_worths(worths: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
     return figures._picture(
         "worths",
         "Worths with their intervals",
-        "Each technique's worth in four models, centred on 0 within a framing; lines are 95 % intervals over participants where a "
-        "model has them. Models have units of their own: compare the order and the gaps against the intervals, not the numbers.",
+        "Each technique's worth in four models, centred on 0 within a framing; lines are intervals: over resampled "
+        "participants, for the ordinal model by Wald. Models have units of their own: compare the order and the gaps against the intervals, not the numbers.",
         "; ".join(
             f"{framing_label(codebook, framing)}, {MODELS.get(model, (model, ''))[0]}: "
             + ", ".join(f"{codebook.label(row.technique)} {row.estimate:z.2f}" for row in rows.itertuples())
@@ -139,7 +142,7 @@ def draw_ladder(worths: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
         "jod_ladder",
         "The JOD ladder",
         "Thurstone case V worths in just-objectionable differences: of two techniques 1 JOD apart, three of four answers prefer the "
-        "upper one. Bars are 95 % intervals over participants; 0 is the mean of the framing.",
+        "upper one. Bars are intervals over resampled participants; 0 is the mean of the framing.",
         "; ".join(
             f"{framing_label(codebook, framing)}: "
             + ", ".join(f"{codebook.label(row.technique)} {row.estimate:z.2f} JOD" for row in rows.itertuples())
@@ -212,12 +215,12 @@ def draw_pairs(
     return figures._picture(
         "pairs",
         "Every difference, with its interval" + (" and the margin" if margin else ""),
-        "Mean preference of each pair on the scale from -2 to 2, right of 0 for the first technique named. ".replace("-2", "\u22122")
+        "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: left of 0 for the first technique, right for the second. "
         + about
         + "Colour and marker say what the tests come to after Holm's correction.",
         "; ".join(
             f"{framing_label(codebook, row.framing)}: {codebook.label(row.a)} against {codebook.label(row.b)} "
-            f"{-row.mean_preference:+z.2f}, {VERDICTS[one][0]}"
+            f"{row.mean_preference:+z.2f}, {VERDICTS[one][0]}"
             for row, one in zip(found.itertuples(), verdicts, strict=True)
         ),
         _pairs,
@@ -243,7 +246,7 @@ def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Fig
             if margin and np.isfinite(row.equivalence_low):
                 low, high = row.equivalence_low, row.equivalence_high
             _, colour, marker = VERDICTS[row.verdict]
-            _interval(ax, -row.mean_preference, -high, -low, names.index((row.a, row.b)), colour, marker)
+            _interval(ax, row.mean_preference, low, high, names.index((row.a, row.b)), colour, marker)
         ax.set_title(figures._cut(framing_label(codebook, framing), 18), loc="left")
         ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
@@ -251,7 +254,7 @@ def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Fig
         ax.set_xticks(range(-2, 3))
         ax.tick_params(labelbottom=True)
         ax.grid(axis="x")
-    panels[(len(panels) - 1) // 2].set_xlabel("mean preference: left of 0 the second technique, right of 0 the first")
+    panels[(len(panels) - 1) // 2].set_xlabel("\N{LEFTWARDS ARROW} first technique      mean preference      second technique \N{RIGHTWARDS ARROW}")
     used = [one for one in VERDICTS if one in set(found.verdict)]
     keys = [Line2D([], [], color=VERDICTS[one][1], marker=VERDICTS[one][2], markersize=4.5, linewidth=1.6) for one in used]
     figure.legend(keys, [VERDICTS[one][0] for one in used], loc="outside lower center", ncols=len(used))
@@ -266,7 +269,7 @@ def draw_scores(scores: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
     return figures._picture(
         "scores_intervals",
         "Scores with their intervals",
-        "The points of figure 5.3 of the thesis with 95 % intervals over participants: where intervals overlap widely, other people "
+        "The points of figure 5.3 of the thesis with intervals over resampled participants: where intervals overlap widely, other people "
         "could have put the techniques in another order.",
         "; ".join(
             f"{codebook.framing_label(framing)}: "
@@ -303,7 +306,7 @@ def _scores(found: pd.DataFrame, codebook: Codebook) -> Figure:
 
 def draw_agreement(agreement: pd.DataFrame, codebook: Codebook, simulated: bool = False) -> Picture | None:
     """Consistency within and agreement between people, framing by framing."""
-    found = agreement[agreement.statistic.isin(STATISTICS) & agreement.value.notna()]
+    found = agreement[agreement.statistic.isin(DRAWN) & agreement.value.notna()]
     if found.empty:
         return None
     return figures._picture(
@@ -311,7 +314,7 @@ def draw_agreement(agreement: pd.DataFrame, codebook: Codebook, simulated: bool 
         "Consistency and agreement",
         "1 is perfect; 0 is what chance gives. Lines are intervals where there are any.",
         "; ".join(
-            f"{framing_label(codebook, row.framing)}: {STATISTICS[row.statistic]} {row.value:z.2f}" for row in found.itertuples()
+            f"{framing_label(codebook, row.framing)}: {DRAWN[row.statistic]} {row.value:z.2f}" for row in found.itertuples()
         ),
         _agreement,
         found,
@@ -321,14 +324,14 @@ def draw_agreement(agreement: pd.DataFrame, codebook: Codebook, simulated: bool 
 
 
 def _agreement(found: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings, statistics = list(dict.fromkeys(found.framing)), [name for name in STATISTICS if name in set(found.statistic)]
+    framings, statistics = list(dict.fromkeys(found.framing)), [name for name in DRAWN if name in set(found.statistic)]
     labels = [figures._wrapped(framing_label(codebook, name), 16) for name in framings]
     figure, panels = figures._panels(len(statistics), 3, 0.62 + figures._row_in(labels) * len(labels), sharex=True, sharey=True)
     for ax, statistic in zip(panels, statistics, strict=True):
         for row in found[found.statistic == statistic].itertuples():
             _interval(ax, row.value, row.low, row.high, framings.index(row.framing))
         ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
-        ax.set_title(figures._wrapped(STATISTICS[statistic], 32), loc="left", size=8)
+        ax.set_title(figures._wrapped(DRAWN[statistic], 32), loc="left", size=8)
         ax.set_yticks(range(len(labels)), labels)
         ax.set_ylim(len(labels) - 0.5, -0.5)
         ax.set_xlim(min(-0.1, float(np.nanmin(found[["value", "low"]].to_numpy())) - 0.05), 1.05)
@@ -382,7 +385,7 @@ def draw_objective(table: pd.DataFrame, measure: str, about: str, codebook: Code
     return figures._picture(
         f"objective_{measure}",
         f"Worth against {about}",
-        "Thurstone case V worth with 95 % interval. Ringed and joined: the Pareto front, techniques that no other one beats in worth "
+        "Thurstone case V worth with its interval. Ringed and joined: the Pareto front, techniques that no other one beats in worth "
         f"without having more {about}.",
         "; ".join(
             f"{framing_label(codebook, row.framing)}, {codebook.label(row.technique)}: {row.value:g}, {row.estimate:z.2f} JOD"

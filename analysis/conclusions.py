@@ -1,0 +1,212 @@
+"""In plain words, from the numbers: what can be concluded, what cannot. Every sentence holds a number of the tables, or none.
+
+A difference is concluded where Holm's p of the declared test is at most 1 - level; that two techniques are as good as each other only
+where both one-sided tests put them within the declared margin. Everything else is undecided, and said to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from .codebook import Codebook
+from .options import OVERALL, Options
+from .shown import MINUS, alpha_of, number, probability
+from .worth_figures import framing_label, verdict
+
+#: How many pairs one sentence names.
+MOST = 12
+
+
+@dataclass
+class Conclusions:
+    """can: what the answers show; cannot: what they do not."""
+
+    can: list[str] = field(default_factory=list)
+    cannot: list[str] = field(default_factory=list)
+
+
+def conclude(
+    tables: Mapping[str, pd.DataFrame],
+    notes: Mapping[str, tuple[str, ...]],
+    codebook: Codebook,
+    options: Options,
+    people: int,
+    simulated: bool,
+) -> Conclusions:
+    """The sentences of a report, in the order in which they are to be read."""
+    found = Conclusions()
+    alpha = alpha_of(options)
+    pairs = tables["pairs"]
+    for framing, rows in pairs[pairs.framing != OVERALL].groupby("framing", sort=False):
+        _about_pairs(found, framing_label(codebook, framing), rows, codebook, options, alpha)
+    if not (options.margin or options.margin_jod):
+        found.cannot.append(
+            "No margin of equivalence was declared before the data, so that no two techniques can be called as good as each other; "
+            "that a test finds no difference does not make them equal."
+        )
+    _about_trend(found, tables["trend"], codebook, alpha)
+    _about_agreement(found, tables["agreement"], codebook, alpha)
+    _about_familiarity(found, tables["familiarity_interaction"], codebook, alpha)
+    _about_exclusions(found, tables["participants"], tables["sensitivity"], people)
+    missing = [line for name in ("worths", "pairs") for line in notes.get(name, ()) if "no finite" in line]
+    for line in missing:
+        found.cannot.append(f"There is no fit: {_spoken(line, codebook)}.")
+    found.cannot.append(
+        "Nothing here says how people judge, since a program answered."
+        if simulated
+        else "These answers speak for people like those asked, on displays like theirs, and for these images of this head; "
+        "for other ones they are a guess."
+    )
+    return found
+
+
+def _about_pairs(
+    found: Conclusions, where: str, rows: pd.DataFrame, codebook: Codebook, options: Options, alpha: float
+) -> None:
+    by = {key: [] for key in ("different", "equivalent", "both", "undecided")}
+    for row in rows.itertuples():
+        by[verdict(row, alpha)].append(row)
+    differing = by["different"] + by["both"]
+    if differing:
+        # preference is negative where a is preferred
+        over: dict[str, list[str]] = {}
+        for row in differing:
+            winner, loser = (row.a, row.b) if row.mean_preference < 0 else (row.b, row.a)
+            over.setdefault(winner, []).append(loser)
+        order = sorted(over, key=lambda name: (-len(over[name]), codebook.techniques.index(name)))
+        words = "; ".join(f"{codebook.label(name)} over {listed([codebook.label(one) for one in over[name]])}" for name in order)
+        largest = probability(max(row.holm_p for row in differing))
+        most = largest if largest.startswith("<") else f"at most {largest}"
+        found.can.append(
+            f"{where}: people preferred {words} ({_test(options)}, p {most} after Holm's correction; "
+            f"{len(differing)} of {len(rows)} pairs)."
+        )
+    for row in by["equivalent"] + by["both"]:
+        a, b = codebook.label(row.a), codebook.label(row.b)
+        if options.margin:
+            words = f"{where}: {a} and {b} are as good as each other within the declared margin of {options.margin:g} points"
+            words += f": the mean preference for {b} is {number(row.mean_preference, sign=True)}"
+            words += f", interval {number(row.equivalence_low, sign=True)} to {number(row.equivalence_high, sign=True)}"
+            words += f" (two one-sided tests, p {_equals(row.tost_p)}, {_equals(row.tost_holm_p)} after Holm's correction)."
+        else:
+            words = f"{where}: {a} and {b} are as good as each other within the declared margin of {options.margin_jod:g} JOD"
+            words += f": {b} is {number(row.jod, sign=True)} JOD above {a}."
+        if row in by["both"]:
+            words += " The difference is real, and small."
+        found.can.append(words)
+    untested = [row for row in rows.itertuples() if not np.isfinite(row.holm_p)]
+    if untested:
+        found.cannot.append(f"{where}: too few answers to test {_pairs(untested, codebook)}.")
+    undecided = [row for row in by["undecided"] if np.isfinite(row.holm_p)]
+    if undecided:
+        all_of = "all " if len(undecided) == len(rows) and len(rows) > 1 else ""
+        tail = "neither a difference nor equality is shown" if options.margin or options.margin_jod else "no difference is shown, which does not make them equal"
+        found.cannot.append(
+            f"{where}: undecided {'is' if len(undecided) == 1 else 'are'} {all_of}{len(undecided)} of {len(rows)} pairs: {tail} for "
+            f"{_pairs(undecided, codebook)}."
+        )
+
+
+def _about_trend(found: Conclusions, trend: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
+    slope = trend[trend.statistic == "slope_strength"]
+    if slope.empty or not np.isfinite(slope.value.iloc[0]):
+        return
+    row = slope.iloc[0]
+    path = "from near to far" if codebook.near_to_far else "from framing to framing in the study's order"
+    words = f"the points that an answer gives change by {number(row.value, 3, sign=True)} a framing {path}"
+    if np.isfinite(row.low):
+        words += f" (interval {number(row.low, 3, sign=True)} to {number(row.high, 3, sign=True)}"
+        words += f", p {_equals(row.p)})" if np.isfinite(row.p) else ")"
+    if np.isfinite(row.p) and row.p <= alpha:
+        found.can.append(f"Preferences get {'weaker' if row.value < 0 else 'stronger'} along the framings: {words}.")
+    else:
+        found.cannot.append(f"Whether preferences weaken or grow along the framings: {words}.")
+
+
+def _about_agreement(found: Conclusions, agreement: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
+    rows = agreement[agreement.framing != OVERALL].set_index(["framing", "statistic"])
+    agree: dict[bool, list[str]] = {True: [], False: []}
+    for framing in dict.fromkeys(agreement.framing[agreement.framing != OVERALL]):
+        values = [rows.loc[(framing, name)] for name in ("kendall_u", "kendall_u_conditional") if (framing, name) in rows.index]
+        tested = [one for one in values if np.isfinite(one.value) and np.isfinite(one.p)]
+        if tested:
+            words = f"{number(tested[0].value)} at {framing_label(codebook, framing)} (p {_equals(tested[0].p)})"
+            agree[bool(tested[0].p <= alpha)].append(words)
+    if agree[True]:
+        found.can.append(
+            f"People agree with each other more than chance would: Kendall's u is {listed(agree[True])}; 1 would be full agreement."
+        )
+    if agree[False]:
+        found.cannot.append(f"Whether people agree with each other more than chance would: Kendall's u is {listed(agree[False])}.")
+    side = rows[rows.index.get_level_values("statistic") == "left_share"] if len(rows) else rows
+    leaning = [(framing, one) for (framing, _), one in side.iterrows() if np.isfinite(one.p) and one.p <= alpha]
+    if leaning:
+        words = listed([f"{100 * one.value:.0f} % at {framing_label(codebook, framing)} (p {_equals(one.p)})" for framing, one in leaning])
+        found.can.append(f"People lean to one side: of their preferences, the left image got {words}; sides were shuffled against that.")
+
+
+def _about_familiarity(found: Conclusions, table: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
+    tested = table[table.holm_p.notna()]
+    if tested.empty:
+        return
+    hits = tested[tested.holm_p <= alpha]
+    if len(hits):
+        words = listed(
+            [
+                f"{codebook.label(row.technique)} at {framing_label(codebook, row.framing)} "
+                f"({number(row.slope, sign=True)} points a level, p {_equals(row.holm_p)})"
+                for row in hits.itertuples()
+            ]
+        )
+        found.can.append(f"Familiarity with computer graphics changes the preference for {words}.")
+        return
+    least = tested.detectable.min()
+    words = "Whether familiarity with computer graphics changes preference: no change is shown"
+    if np.isfinite(least):
+        words += f", and with so many people only a correlation of {number(least)} or more would be found four times in five"
+    found.cannot.append(words + ".")
+
+
+def _about_exclusions(found: Conclusions, participants: pd.DataFrame, sensitivity: pd.DataFrame, people: int) -> None:
+    out = int(participants.excluded.fillna("").astype(str).ne("").sum())
+    if not out:
+        found.can.append(f"The declared rules of exclusion fire for none of {count(people, 'participant')}: no conclusion hangs on them.")
+        return
+    changed = int(sensitivity.changed.fillna(False).astype(bool).sum())
+    words = f"Without the {count(out, 'participant')} whom the declared rules exclude, {changed} of {count(len(sensitivity), 'conclusion')}"
+    if changed:
+        found.cannot.append(f"{words} would change; see the table of those.")
+    else:
+        found.can.append(f"{words} would change: none hangs on them.")
+
+
+def _test(options: Options) -> str:
+    return {"wilcoxon": "Wilcoxon's signed-rank test", "sign": "sign test"}[options.test]
+
+
+def _equals(p: float) -> str:
+    text = probability(p)
+    return text.replace("<", "< ").replace(">", "> ") if text[0] in "<>" else f"= {text}"
+
+
+def _pairs(rows: list, codebook: Codebook) -> str:
+    names = [f"{codebook.label(row.a)} and {codebook.label(row.b)}" for row in rows[:MOST]]
+    return "; ".join(names) + (f"; and {len(rows) - MOST} more" if len(rows) > MOST else "")
+
+
+def _spoken(line: str, codebook: Codebook) -> str:
+    """A note of the computation with the labels of framings."""
+    name, mark, rest = line.partition(", ")
+    return f"{framing_label(codebook, name)}{mark}{rest}".replace("-inf", f"{MINUS}inf").rstrip(".")
+
+
+def listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

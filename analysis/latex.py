@@ -1,0 +1,68 @@
+"""report.tex: every table that is read, with booktabs, to be compiled alone or taken apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from .figures import SIMULATED
+from .shown import MINUS, NOTHING, Shown
+
+_ESCAPES = {
+    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", '"': r"\textquotedbl{}",
+    MINUS: r"$-$", NOTHING: "--", "\N{PLUS-MINUS SIGN}": r"$\pm$",
+}  # fmt: skip
+
+PREAMBLE = r"""% Tables with booktabs. Compile this file alone, or \input the part between the lines of '%' of one table.
+\documentclass[10pt]{article}
+\usepackage[T1]{fontenc}
+\usepackage[utf8]{inputenc}
+\usepackage{textcomp}
+\usepackage[a4paper,landscape,margin=15mm]{geometry}
+\usepackage{booktabs,longtable}
+\setlength{\tabcolsep}{3.5pt}
+\begin{document}
+"""
+
+
+def escape(text: str) -> str:
+    """Any text as LaTeX prints it; characters that the fonts lack stay as UTF-8."""
+    return "".join(_ESCAPES.get(mark, mark) for mark in " ".join(text.split()))
+
+
+def table(shown: Shown, simulated: bool = False) -> str:
+    """One table as a longtable, which may run over pages. A cell that repeats the one above it in the first column stays empty."""
+    columns = "".join("r" if numeric else "l" for numeric in shown.numeric)
+    caption = escape(f"{SIMULATED}. {shown.caption}" if simulated else shown.caption)
+    head = " & ".join(escape(name) for name in shown.columns)
+    note = escape(shown.note)
+    lines = [
+        f"% {shown.name}",
+        rf"\begin{{longtable}}{{@{{}}{columns}@{{}}}}",
+        rf"\caption{{{caption}{'. ' + note if note else ''}}}\label{{tab:{escape_label(shown.name)}}}\\",
+        rf"\toprule {head} \\ \midrule \endfirsthead",
+        rf"\toprule {head} \\ \midrule \endhead",
+        r"\bottomrule \endlastfoot",
+    ]
+    above = None
+    for row in shown.rows:
+        cells = [escape(cell) for cell in row]
+        if above is not None and row[0] != above:
+            lines.append(r"\addlinespace")
+        cells[0] = cells[0] if row[0] != above else ""
+        # a cell that begins with a bracket would be read as the length of \\
+        lines.append(" & ".join("{}" + cell if cell.startswith("[") else cell for cell in cells) + r" \\")
+        above = row[0]
+    return "\n".join([*lines, r"\end{longtable}", ""])
+
+
+def escape_label(name: str) -> str:
+    return "".join(mark if mark.isalnum() else "-" for mark in name)
+
+
+def document(tables: Iterable[Shown], title: str, simulated: bool = False) -> str:
+    """All tables in one file that compiles alone."""
+    size = [r"\footnotesize" + "\n", rf"\section*{{{escape(title)}}}" + "\n"]
+    if simulated:
+        size.append(rf"\noindent\textbf{{{SIMULATED}}}: every answer was made by a program." + "\n")
+    return "\n".join([PREAMBLE, *size, *(table(one, simulated) for one in tables), r"\end{document}", ""])

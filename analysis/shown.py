@@ -1,0 +1,291 @@
+"""The tables that are read: the same rows and words on the page, in the PDF and in LaTeX.
+
+Numbers are formatted here, once; what does not exist is an en dash. `tables/*.csv` hold every digit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from .codebook import Codebook
+from .options import Options
+from .worth_figures import DRAWN, MODELS, VERDICTS, framing_label, verdict
+
+#: Statistics of agreement.csv that are read, with their names.
+STATISTICS = DRAWN | {
+    "circular_triads": "circular triads a person",
+    "kendall_u_conditional": "Kendall's u, ties kept",
+    "krippendorff_alpha_both_ways": "Krippendorff's alpha, pairs both ways",
+    "left_share": "share of preferences for the left image",
+    "side_effect": "side effect of the ordinal model, logits to the right",
+    "repeat_same_answer": "same answer when asked again",
+    "median_rt_ms": "median time of an answer, ms",
+    "median_rt_ms_decided": "the same, one preferred",
+    "median_rt_ms_none": "the same, no difference seen",
+}
+NOTHING = "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A table to read. columns: headings; numeric: which of them are numbers, set to the right; rows: cells as text."""
+
+    name: str
+    caption: str
+    columns: tuple[str, ...]
+    numeric: tuple[bool, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def number(value: float | None, digits: int = 2, sign: bool = False) -> str:
+    """1.234 as '1.23', with a true minus; an en dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return NOTHING
+    return f"{value:{'+' if sign else ''}z.{digits}f}".replace("-", MINUS)
+
+
+def interval(value: float, low: float, high: float, digits: int = 2) -> str:
+    """'1.23 [0.90, 1.56]', without brackets where there is no interval."""
+    if not np.isfinite(low) or not np.isfinite(high):
+        return number(value, digits)
+    return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
+
+
+def probability(p: float | None) -> str:
+    """A p value as journals print it: '<0.001', '0.012', '0.34'."""
+    if p is None or not np.isfinite(p):
+        return NOTHING
+    if p < 0.001:
+        return "<0.001"
+    if p > 0.999:
+        return ">0.999"
+    return f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
+
+
+def worths(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
+    models = [name for name in MODELS if name in set(table.model)]
+    cells = table.set_index(["framing", "technique", "model"])
+    rows = []
+    for framing in dict.fromkeys(table.framing):
+        here = table[table.framing == framing]
+        for technique in dict.fromkeys(here.technique):
+            values = [
+                interval(*cells.loc[(framing, technique, model), ["estimate", "low", "high"]])
+                if (framing, technique, model) in cells.index
+                else NOTHING
+                for model in models
+            ]
+            rows.append((framing_label(codebook, framing), codebook.label(technique), *values))
+    return Shown(
+        "worths",
+        f"Worths, centred on 0 within a framing, with {100 * options.level:g} % intervals",
+        ("Framing", "Technique", *(f"{MODELS[model][0]} ({MODELS[model][1]})" for model in models)),
+        (False, False, *[True] * len(models)),
+        tuple(rows),
+        "Intervals by resampling participants, those of the ordinal model by Wald from its information.",
+    )
+
+
+def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
+    alpha = alpha_of(options)
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            codebook.label(row.a),
+            codebook.label(row.b),
+            f"{row.n:g}",
+            " / ".join(f"{count:g}" for count in (row.strong_a, row.slight_a, row.none, row.slight_b, row.strong_b)),
+            interval(row.mean_preference, row.low, row.high),
+            probability(row.wilcoxon_p),
+            probability(row.sign_p),
+            probability(row.holm_p),
+            probability(row.tost_p),
+            number(row.rank_biserial),
+            interval(row.jod, row.jod_low, row.jod_high),
+            VERDICTS[verdict(row, alpha)][0],
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "pairs",
+        "Every pair: answers, tests and what they come to",
+        (
+            "Framing", "A", "B", "n", "Answers", "Mean preference for B", "Wilcoxon p", "Sign p", "Holm p", "TOST p",
+            "Rank-biserial", "JOD, B less A", "Verdict",
+        ),
+        (False, False, False, *[True] * 9, False),
+        tuple(rows),
+        "Answers: strong for A / slight for A / no difference / slight for B / strong for B. Positive numbers favour B. "
+        f"Holm's correction is of the {_test(options)}, over the pairs of {_family(options)}; the verdict is at {alpha:g}.",
+    )  # fmt: skip
+
+
+def agreement(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            STATISTICS[row.statistic],
+            interval(row.value, row.low, row.high, 0 if "_rt_" in row.statistic else 3),
+            probability(row.p),
+        )
+        for row in table.itertuples()
+        if row.statistic in STATISTICS and np.isfinite(row.value)
+    ]
+    return Shown(
+        "agreement",
+        "Agreement and quality",
+        ("Framing", "Statistic", "Value", "p"),
+        (False, False, True, True),
+        tuple(rows),
+    )
+
+
+def priorities(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    kinds = list(dict.fromkeys(zip(table.aggregation, table.method, strict=True)))
+    cells = table.set_index(["framing", "technique", "aggregation", "method"])
+    rows = []
+    for framing, technique in dict.fromkeys(zip(table.framing, table.technique, strict=True)):
+        values = [
+            interval(*cells.loc[(framing, technique, *kind), ["priority", "low", "high"]], 3)
+            if (framing, technique, *kind) in cells.index
+            else NOTHING
+            for kind in kinds
+        ]
+        rows.append((framing_label(codebook, framing), codebook.label(technique), *values))
+    names = {"median": "median", "geometric_mean": "geometric mean", "eigenvector": "eigenvector", "row_geometric_mean": "row mean"}
+    return Shown(
+        "ahp_intervals",
+        "AHP priorities by how people are put together and how priorities are found",
+        ("Framing", "Technique", *(f"{names.get(one, one)}, {names.get(other, other)}" for one, other in kinds)),
+        (False, False, *[True] * len(kinds)),
+        tuple(rows),
+        "Row mean: geometric mean of the rows. Intervals by resampling participants.",
+    )
+
+
+def consistency(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    names = {"median": "median", "geometric_mean": "geometric mean"}
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            names.get(row.aggregation, row.aggregation),
+            interval(row.ci, row.ci_low, row.ci_high, 3),
+            interval(row.cr, row.cr_low, row.cr_high, 3),
+            f"{codebook.label(row.a)} over {codebook.label(row.b)}" if isinstance(row.a, str) and row.a else NOTHING,
+            number(row.judgement),
+            number(row.consistent),
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "ahp_consistency",
+        "Consistency of the AHP matrices, and the judgement to look at again",
+        ("Framing", "People by", "CI", "CR", "Look again at", "Judgement", "The others imply"),
+        (False, False, True, True, False, True, True),
+        tuple(rows),
+    )
+
+
+def trend(table: pd.DataFrame) -> Shown:
+    names = {
+        "slope_total": "slope of the total, points a framing",
+        "slope_strength": "slope of a person's mean strength, points an answer and framing",
+        "page_l": "Page's L",
+    }
+    rows = [
+        (names.get(row.statistic, row.statistic), interval(row.value, row.low, row.high, 3), probability(row.p))
+        for row in table.itertuples()
+        if np.isfinite(row.value)
+    ]
+    return Shown("trend", "Preference against distance", ("Statistic", "Value", "p"), (False, True, True), tuple(rows))
+
+
+def familiarity(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            codebook.label(row.technique) if row.technique else "all together",
+            f"{row.n:g}",
+            interval(row.slope, row.low, row.high),
+            number(row.spearman),
+            probability(row.p),
+            probability(row.holm_p),
+            number(row.detectable),
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "familiarity_interaction",
+        "Does familiarity change preference?",
+        ("Framing", "Technique", "n", "Slope a level", "Spearman", "p", "Holm p", "Found with power 0.8 from"),
+        (False, False, *[True] * 6),
+        tuple(rows),
+        "Slope: change of a technique's mean preference for each level of familiarity. The last column is the smallest correlation "
+        "that so many people find with a power of 0.8: smaller ones would mostly be missed.",
+    )
+
+
+def sensitivity(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            {"preferred": "preferred", "equivalent": "as good as each other", "first": "highest worth"}.get(row.conclusion, row.conclusion),
+            _pair(row, codebook),
+            _said(row.everyone, codebook),
+            _said(row.without_excluded, codebook),
+        )
+        for row in table.itertuples()
+        if row.changed
+    ]
+    return Shown(
+        "sensitivity",
+        "Conclusions that change without the excluded participants",
+        ("Framing", "Conclusion", "Pair", "With everyone", "Without the excluded"),
+        (False,) * 5,
+        tuple(rows),
+    )
+
+
+def alpha_of(options: Options) -> float:
+    """The level of a test that goes with the level of the intervals: 0.05 with 95 %."""
+    return round(1 - options.level, 10)
+
+
+def all_shown(tables: Mapping[str, pd.DataFrame], codebook: Codebook, options: Options) -> dict[str, Shown]:
+    """Every table of `compute.everything` that is read, by name, without empty ones."""
+    found: Sequence[Shown] = (
+        worths(tables["worths"], codebook, options),
+        pairs(tables["pairs"], codebook, options),
+        priorities(tables["ahp_intervals"], codebook),
+        consistency(tables["ahp_consistency"], codebook),
+        trend(tables["trend"]),
+        agreement(tables["agreement"], codebook),
+        familiarity(tables["familiarity_interaction"], codebook),
+        sensitivity(tables["sensitivity"], codebook),
+    )
+    return {one.name: one for one in found if one.rows}
+
+
+def _pair(row: object, codebook: Codebook) -> str:
+    names = [codebook.label(name) for name in (row.a, row.b) if isinstance(name, str) and name]
+    return ", ".join(names) or NOTHING
+
+
+def _said(value: object, codebook: Codebook) -> str:
+    if isinstance(value, str):
+        return codebook.label(value) if value in codebook.techniques else value
+    return NOTHING if value is None or (isinstance(value, float) and np.isnan(value)) else str(value)
+
+
+def _test(options: Options) -> str:
+    return {"wilcoxon": "Wilcoxon test", "sign": "sign test"}[options.test]
+
+
+def _family(options: Options) -> str:
+    return {"study": "all framings together", "framing": "each framing"}[options.family]
