@@ -12,6 +12,7 @@ import json
 import math
 import os
 import threading
+import time
 import zipfile
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
@@ -24,7 +25,7 @@ import numpy as np
 from renderer.errors import InputError
 
 BATCHES = 64
-CHUNK = 2000  # photons between two looks at the clock and the stop sign
+CHUNK, CHUNK_S = 256, 0.02  # photons between two looks at the stop sign: this many at first, then as many as take that long
 SAVE_EVERY_S = 30.0
 BINS, ANGLES = 120, 90
 ILLUMINATIONS = ("searchlight", "diffuse")
@@ -294,7 +295,7 @@ def simulate(
     largest with fewer. progress: a bar on stderr. threads: one a core if None; the numbers do not depend on it.
     """
     layers = tuple(layers)
-    photons = _whole("photons", photons, BATCHES)
+    photons, threads = _whole("photons", photons, BATCHES), _cores() if threads is None else _whole("threads", threads, 1)
     if np.ndim(bins) == 0:
         count = _whole("bins", bins, 1)
         reach = default_reach_mm([layer for layer in layers if isinstance(layer, Layer)]) if r_max_mm is None else r_max_mm
@@ -307,7 +308,7 @@ def simulate(
     setting = Setting(layers, seed, n_above, n_below, illumination, tuple(float(edge) for edge in bins))
     run = Run(setting, photons, cache_folder() if cache else None)
     if (run.done < run.sizes).any():
-        run.go(progress, threads or _cores())
+        run.go(progress, threads)
     return Result(setting, photons, run.tally)
 
 
@@ -367,13 +368,16 @@ class Run:
             sums, state, done = mine.sums[0], self.state[b], int(self.done[b])
             sums[:] = self.tally.sums[b]
             views = (mine.unscattered[0], mine.absorbed[0], mine.radial[0], mine.angular[0])
+            count = CHUNK
             while done < self.sizes[b] and not stop.is_set():
-                count = min(CHUNK, int(self.sizes[b]) - done)
+                count, start = min(count, int(self.sizes[b]) - done), time.perf_counter()
                 state = np.uint64(walk(count, state, *arrays, *views))
                 done += count
                 with lock:
                     self.tally.sums[b], self.state[b], self.done[b] = sums, state, done
                     bar.update(count)
+                if time.perf_counter() - start < CHUNK_S:
+                    count *= 2
 
         with bar, ThreadPoolExecutor(threads) as pool:
             waiting = {pool.submit(batch, b) for b in range(BATCHES) if self.done[b] < self.sizes[b]}

@@ -95,13 +95,11 @@ def fresnel(n1, n2, cos1):
 @numba.njit(**_INLINE)
 def _bin(edges, value):
     """i with edges[i] <= value < edges[i + 1], for rising edges; len(edges) - 1 beyond the last."""
-    low, high = 0, len(edges)
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if value >= edges[middle]:
-            low = middle
-        else:
-            high = middle
+    low, count = 0, len(edges)
+    while count > 1:
+        half = count >> 1
+        low += half if value >= edges[low + half] else 0  # no branch to predict
+        count -= half
     return low
 
 
