@@ -57,6 +57,8 @@ class Layer:
             raise InputError(f"g is {self.g!r}; expected a mean cosine between -1 and 1, both excluded")
         if _number("d", self.d, 0, "a thickness in mm, more than 0", finite=False) == 0:
             raise InputError("d is 0; expected a thickness in mm, more than 0")
+        for name in self.__dataclass_fields__:  # so that 1 and 1.0 have one name in the cache
+            object.__setattr__(self, name, float(getattr(self, name)))
 
     @property
     def mu_t(self) -> float:
@@ -99,11 +101,11 @@ class Setting:
             raise InputError("a layer with another below it is infinite; expected a thickness d in mm")
         if math.isinf(self.layers[-1].d) and self.layers[-1].mu_a == 0:
             raise InputError("the last layer is infinite and absorbs nothing, so photons would never end; expected mu_a > 0 or a thickness d")
-        _number("n_above", self.n_above, 1, "an index of refraction, 1 or more")
-        _number("n_below", self.n_below, 1, "an index of refraction, 1 or more")
+        for name in ("n_above", "n_below"):
+            object.__setattr__(self, name, _number(name, getattr(self, name), 1, "an index of refraction, 1 or more"))
         if self.illumination not in ILLUMINATIONS:
             raise InputError(f"illumination is {self.illumination!r}; expected {' or '.join(ILLUMINATIONS)}")
-        _whole("seed", self.seed, 0)
+        object.__setattr__(self, "seed", _whole("seed", self.seed, 0))
         edges = np.array(self.edges_mm)
         if len(edges) < 2 or not np.isfinite(edges).all() or edges[0] != 0 or (np.diff(edges) <= 0).any():
             raise InputError("the edges of the bins are not rising numbers; expected 0 < r1 < r2 < ..., in mm, 0 first")
@@ -304,7 +306,6 @@ def simulate(
         bins = reach * (np.arange(count + 1) / count) ** 2
     elif r_max_mm is not None:
         raise InputError("r_max_mm and the edges of the bins are both given; expected one of them")
-    n_above, n_below = (float(n) if isinstance(n, (int, np.number)) else n for n in (n_above, n_below))
     setting = Setting(layers, seed, n_above, n_below, illumination, tuple(float(edge) for edge in bins))
     run = Run(setting, photons, cache_folder() if cache else None)
     if (run.done < run.sizes).any():

@@ -311,6 +311,12 @@ def test_spoilt_stores_do_not_count(own_cache, content):
     assert (sums(simulate(HULST, 6400, seed=23)) == sums(good)).all()
 
 
+def test_whole_numbers_are_numbers(own_cache):
+    simulate([Layer(1, 1, 9, 0, 1)], 640, n_above=1)
+    simulate([Layer(1.0, np.float64(1), 9.0, 0.0, 1.0)], 640, np.int64(0), n_above=1.0)
+    assert len(list(own_cache.iterdir())) == 1
+
+
 def test_every_parameter_has_results_of_its_own(own_cache):
     base = dict(layers=[Layer(1.4, 1, 5, 0.5, 1)], photons=640, seed=1)
     others = [dict(seed=2), dict(n_above=1.2), dict(n_below=1.2), dict(illumination="diffuse"), dict(r_max_mm=1.0), dict(bins=7),
