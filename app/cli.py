@@ -13,6 +13,11 @@ VERBS = {
     "serve": "app.commands.serve",
     "simulate": "app.commands.simulate",
     "analyse": "app.commands.analyse",
+    "profile": "app.commands.profile",
+    "fit": "app.commands.fit",
+    "redraw": "app.commands.redraw",
+    "judge": "app.commands.judge",
+    "montecarlo": "app.commands.montecarlo",
 }
 
 

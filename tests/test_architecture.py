@@ -14,6 +14,7 @@ MAY_IMPORT = {
     "stimuli": {"renderer"},
     "app": {"analysis", "stimuli.design", "stimuli.errors", "stimuli.manifest", "stimuli.study"},
 }
+PROFILE_VERBS = {"profile", "fit", "redraw", "judge", "montecarlo", "media"}  # what they hand over to needs no OpenGL
 MODULES = [path for package in MAY_IMPORT for path in sorted((ROOT / package).rglob("*.py"))]
 
 
@@ -50,6 +51,7 @@ def test_imports(path):
     allowed = MAY_IMPORT[package]
     if relative.parent.as_posix() == "app/commands":  # a verb hands over to the stage that has its name
         allowed = allowed | {f"stimuli.{relative.stem}"} | ({"renderer", "stimuli.heads"} if relative.stem == "render" else set())
+        allowed |= {"renderer.errors", "renderer.medium", "renderer.profiles"} if relative.stem in PROFILE_VERBS else set()
     assert not forbidden(imported(path.read_text(), ".".join(relative.parts[:-1])), package, allowed)
 
 
@@ -66,6 +68,13 @@ def test_application_never_imports_opengl():
     modules = set(run.stdout.split())
     assert "flask" in modules
     assert not modules & {"OpenGL", "pyrender", "pyglet", "renderer"}
+
+
+def test_profiles_never_import_opengl():
+    names = [f"renderer.profiles.{path.stem}" for path in sorted((ROOT / "renderer/profiles").glob("[!_]*.py"))]
+    program = "import sys, importlib\nfor name in sys.argv[1:]: importlib.import_module(name)\nprint(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program, "renderer.medium", *names], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not set(run.stdout.split()) & {"OpenGL", "pyrender", "pyglet", "trimesh", "matplotlib"}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL and OSMesa are Linux's")

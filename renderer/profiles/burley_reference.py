@@ -23,7 +23,7 @@ ORDER_ROWS = EXACT_ORDERS + 1200
 R_MIN, R_MAX, R_BINS = 0.02, 2000.0, 200  # mm = mean free paths; logarithmic bins
 BATCH = 20_000
 ALBEDOS = np.round(np.arange(0.01, 0.995, 0.01), 2)  # the memo's
-RANGE = (0.05, 8.0)  # radii of the fit, in the parametrisation's own length
+RANGE = (0.05, 8.0)  # radii that are judged, in mean free paths
 
 
 @numba.njit(inline="always")
@@ -146,13 +146,15 @@ class Judged:
 
 
 def judge(parametrisation: str, photons: int, seed: int = 0, albedos=ALBEDOS) -> Judged:
-    """Compare R(r) of each albedo with Monte Carlo over RANGE (in mean free paths, or diffuse ones for "dmfp").
+    """Compare R(r) of each albedo with Monte Carlo over RANGE.
 
-    The memo does not print its radii. Bins are equal steps of r (RANGE has 64), the error is the mean of |R - R_MC| / R_MC over
-    bins that are known to 5 %; R is averaged over a bin by its CDF, as photons are.
+    The error is the mean of |R - R_MC| / R_MC over logarithmic bins that are known to 5 %; R is averaged over a bin by its
+    CDF, as photons are. The memo prints neither its radii nor their spacing, and both matter: docs/profiles.md.
     """
     from scipy.optimize import minimize_scalar
 
+    if parametrisation not in burley.PARAMETRISATIONS:
+        raise InputError(f"parametrisation is {parametrisation!r}; expected one of {', '.join(burley.PARAMETRISATIONS)}")
     fit = burley.PARAMETRISATIONS[parametrisation]
     diffuse = parametrisation == "diffuse"
     table = walk(photons, seed, diffuse)
@@ -161,18 +163,19 @@ def judge(parametrisation: str, photons: int, seed: int = 0, albedos=ALBEDOS) ->
         alpha = chandrasekhar.albedo_of(A, diffuse)
         length = float(np.sqrt(grosjean_D(1 - alpha, alpha) / (1 - alpha))) if parametrisation == "dmfp" else 1.0
         edges, share, error = table.profile(alpha)
-        keep = (edges[:-1] >= RANGE[0] * length) & (edges[1:] <= RANGE[1] * length) & (error < 0.05 * share) & (share > 0)
-        width = np.diff(edges)[keep]  # logarithmic bins weighed by width: an even spread of radii
+        keep = (edges[:-1] >= RANGE[0]) & (edges[1:] <= RANGE[1]) & (error < 0.05 * share)
+        if not keep.any():
+            raise InputError(f"{photons} photons leave no bin known to 5 % at an albedo of {A:g}; expected more")
         low, high, share = edges[:-1][keep], edges[1:][keep], share[keep]
 
-        def miss(s):
-            got = A * (burley.cdf(high, length / s) - burley.cdf(low, length / s))
-            return float((width * np.abs(got / share - 1)).sum() / width.sum())
+        def miss(log_s):
+            got = A * (burley.cdf(high, length / np.exp(log_s)) - burley.cdf(low, length / np.exp(log_s)))
+            return float(np.abs(got / share - 1).mean())
 
         # The error has one valley in s; a grid finds it, a search narrows it.
-        grid = np.geomspace(0.4, 40, 120)
+        grid = np.log(length * np.geomspace(0.4, 10, 80))
         at = int(np.argmin([miss(s) for s in grid]))
-        best = minimize_scalar(miss, bounds=(grid[max(at - 1, 0)], grid[min(at + 1, 119)]), method="bounded", options={"xatol": 1e-4})
-        rows.append((best.x, best.fun, fit(A), miss(fit(A))))
+        best = minimize_scalar(miss, bounds=(grid[max(at - 1, 0)], grid[min(at + 1, 79)]), method="bounded", options={"xatol": 1e-5})
+        rows.append((np.exp(best.x), best.fun, fit(A), miss(np.log(fit(A)))))
     columns = np.array(rows).T
     return Judged(parametrisation, np.asarray(albedos, dtype=float), *columns)

@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from renderer.errors import InputError
 from renderer.medium import Stack
 from renderer.profiles.model import Profile, radii
 
@@ -79,55 +80,66 @@ class Fit:
         return reflectance(r_mm, self.variance_mm2, self.weights)
 
 
-def fit(r_mm, target, terms: int, total: float) -> Fit:
-    """The best sum of `terms` Gaussians with weights >= 0 that sum to `total`, by the error of eq. 3.1.
+def fit(r_mm, target, terms: int, total: float | None) -> Fit:
+    """The best sum of `terms` Gaussians with weights >= 0 that sum to `total` (None: free), by the error of eq. 3.1.
 
     r_mm (N,): increasing, from near 0 to where the profile is spent; target (N,): R(r), 1/mm^2. d'Eon, Luebke and Enderton
-    2007, "Efficient rendering of human skin", sec. 5: min int r (R - G)^2 dr over weights and variances. Weights are solved for at
-    each step (least squares under the constraints), variances by Levenberg and Marquardt from several starts.
+    2007, "Efficient rendering of human skin", sec. 5: min int r (R - G)^2 dr over weights and variances. Starts are even
+    spreads and what non-negative least squares picks from a dense set of variances; each is refined by Levenberg and Marquardt
+    over log v and log w, and the best is returned.
     """
     from scipy.optimize import least_squares, nnls
-
-    from renderer.errors import InputError
 
     r, target = np.asarray(r_mm, dtype=float), np.asarray(target, dtype=float)
     if isinstance(terms, bool) or not isinstance(terms, (int, np.integer)) or not 1 <= terms <= 20:
         raise InputError(f"terms is {terms!r}; expected a whole number of Gaussians, 1 to 20")
     if r.ndim != 1 or r.shape != target.shape or len(r) < 4 * terms or not (np.diff(r) > 0).all() or r[0] < 0:
         raise InputError(f"expected increasing radii and as many values, at least {4 * terms} for {terms} Gaussians")
-    if not (np.isfinite(target).all() and np.isfinite(total) and total > 0):
+    if not np.isfinite(target).all() or (total is not None and not 0 < total < np.inf):
         raise InputError("a profile to fit has to be finite with a positive total")
-    root = np.sqrt(np.gradient(r) * r)  # weights of the trapezium rule in int r (...)^2 dr
+    root = np.sqrt(np.gradient(r) * r)  # of the trapezium rule's weights in int r (...)^2 dr
     scale = np.linalg.norm(root * target)
     goal = root * target / scale
 
+    mass = np.cumsum(r * target * np.gradient(r))
+    low, high = np.log(np.interp([0.01, 0.98], mass / mass[-1], r) ** 2 / 2)  # log variances of the profile's own size
+
     def basis(log_v):
-        v = np.exp(log_v)
+        v = np.exp(np.clip(log_v, low - 12, high + 12))
         return root[:, None] * np.exp(-(r[:, None] ** 2) / (2 * v)) / (2 * np.pi * v) / scale
 
-    heavy = 1e3  # the sum is a row of its own in the non-negative problem, then exact by rescaling
+    def weights(log_w):
+        w = np.exp(np.clip(log_w, -60, 60))
+        return w if total is None else w / w.sum() * total
 
-    def weights(log_v):
-        columns = basis(log_v)
-        w = nnls(np.vstack([columns * total, heavy * np.ones(len(log_v))]), np.append(goal, heavy))[0]
-        return w / w.sum() * total
+    def residual(p):
+        return basis(p[:terms]) @ weights(p[terms:]) - goal
 
-    def residual(log_v):
-        log_v = np.clip(log_v, *bounds)
-        return basis(log_v) @ weights(log_v) - goal
+    def project(log_v):
+        """Non-negative least squares, with the sum as a heavy row."""
+        columns, right = basis(log_v), goal
+        if total is not None:
+            columns, right = np.vstack([columns, 100 * np.ones(len(log_v)) / total]), np.append(goal, 100.0)
+        size = np.linalg.norm(columns, axis=0)
+        return nnls(columns / size, right, maxiter=100 * len(log_v))[0] / size
 
-    energy = np.cumsum(r * target * np.gradient(r))
-    r_low, r_high = np.interp([0.02, 0.995], energy / energy[-1], r)
-    bounds = np.log(np.array([max(r_low, r[1]) ** 2 / 200, r_high**2 * 20]))
+    dense = np.linspace(low - 3, high + 2, 60)
+    share = np.cumsum(project(dense) + 1e-9)
+    starts = [np.interp((np.arange(terms) + 0.5) / terms, share / share[-1], dense)]
+    for inset in (0.0, 0.15, 0.3):
+        width = (high - low) * (1 - 2 * inset)
+        starts.append(low + (high - low) * inset + width * (np.arange(terms) + 0.5) / terms)
     best = None
-    for low, high in ((0.25, 0.5), (0.1, 1.0), (0.5, 0.35)):
-        start = np.log(np.geomspace((low * r_low) ** 2, (high * r_high) ** 2, terms) if terms > 1 else np.array([low * r_low * high * r_high]))
-        found = least_squares(residual, np.clip(start, *bounds), method="trf", x_scale=1.0, max_nfev=200, diff_step=1e-5)
-        if best is None or found.cost < best.cost:
+    for start in starts:
+        start = start + 1e-3 * np.arange(terms)
+        first = np.log(np.maximum(project(start), 1e-3 * target.max() * np.exp(low)))
+        found = least_squares(residual, np.concatenate([start, first]), method="lm", max_nfev=4000, xtol=1e-12, ftol=1e-12)
+        if found.success and (best is None or found.cost < best.cost):
             best = found
-    log_v = np.sort(np.clip(best.x, *bounds))
-    w = weights(log_v)
-    variance = np.exp(log_v)
+    if best is None:
+        raise ArithmeticError(f"the fit of {terms} Gaussians did not converge")
+    order = np.argsort(best.x[:terms])
+    variance, w = np.exp(best.x[:terms])[order], weights(best.x[terms:])[order]
     got = reflectance(r, variance, w)
     return Fit(variance, w, float(radial_error(r, target[:, None], got[:, None])[0]))
 

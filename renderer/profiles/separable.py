@@ -15,7 +15,7 @@ import numpy as np
 from renderer.errors import InputError
 from renderer.profiles import gaussians
 
-GUIDE_B = 1e4  # 1/mm^2; the paper prints no b for eq. 3.4: so large that the guide is 0 on the axes alone and k = 0 means no guide off them
+GUIDE_B = np.inf  # 1/mm^2; no b is printed for eq. 3.4, and "k = 0 is no guide" holds for an infinite one alone
 
 
 def tap_offsets(taps: int, reach: float) -> np.ndarray:
@@ -141,26 +141,28 @@ def svd(profile: Callable, reach_mm: float, points: int = 200) -> Kernel:
 
 
 def guide(x: np.ndarray, y: np.ndarray, k: float, b: float = GUIDE_B) -> np.ndarray:
-    """Gamma(x, y, k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)), eq. 3.4."""
-    return (x**2 + y**2) ** (k / 2) * -np.expm1(-b * x**2) * -np.expm1(-b * y**2)
+    """Gamma(x, y, k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)), eq. 3.4, b in 1/mm^2.
+
+    A finite b frees the kernel on the axes, where the energy that the tail does not need then gathers in a spike at 0.
+    """
+    radial = (x**2 + y**2) ** (k / 2)
+    return radial if np.isinf(b) else radial * -np.expm1(-b * x**2) * -np.expm1(-b * y**2)
 
 
 def guided(profile: Callable, reach_mm: float, k: float = 2.0, points: int = 200, b: float = GUIDE_B) -> Kernel:
     """argmin_a int Gamma (R - a(x) a(y))^2 with a >= 0, symmetric, and |a|_1^2 = |R|_1 (eqs. 3.3 and 3.4).
 
-    k = 0 cares for the peak, k = 2 (the paper's choice) for the tail. On the axes, where the guide is 0, k = 0 takes 1 instead: the
-    paper says that k = 0 is "no guide". Projected L-BFGS over a half-line, renormalised in every step.
+    k = 0 cares for the peak, k = 2 (the paper's choice) for the tail. Projected L-BFGS over a half-line, renormalised in every step.
     """
     from scipy.optimize import minimize
 
-    if not np.isfinite(k) or k < 0:
-        raise InputError(f"k is {k}; expected 0 or more")
+    if not np.isfinite(k) or k < 0 or not b > 0:
+        raise InputError(f"k is {k} and b {b}; expected k of 0 or more and b above 0")
     x = half_grid(reach_mm, points)
     delta = x[1] - x[0]
     R = quadrant(profile, x)
     count = np.where(np.arange(len(x)) == 0, 1.0, 2.0)
-    gamma = np.ones_like(R) if k == 0 else guide(x[:, None], x, k, b)
-    weight = gamma * np.outer(count, count)
+    weight = guide(x[:, None], x, k, b) * np.outer(count, count)
     weight = weight / (weight * R**2).sum()
 
     def cost(raw):
