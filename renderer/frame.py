@@ -24,12 +24,11 @@ SIZE_LIMIT = 8192  # pixels of a side after supersampling
 @dataclass(frozen=True)
 class Result:
     """image (H, W, 3) uint8 sRGB; samples (H s, W s) uint8, 0 where no scattering material is seen;
-    contrast (H s, W s) float32 in [0, 1], or None; scattered (H s, W s, 4) float32 irradiance and mask."""
+    contrast (H s, W s) float32 in [0, 1], or None where the technique measures none."""
 
     image: np.ndarray
     samples: np.ndarray
     contrast: np.ndarray | None
-    scattered: np.ndarray
 
 
 class Renderer:
@@ -109,16 +108,18 @@ class Renderer:
         program = self.program("passes/shadow.frag", vertex="passes/shadow.vert")
         for lamp in self.studio.lamps:
             matrix = scene.lamp_matrix(lamp, everything)
-            solid = gl.Target(LAMP_MAP, LAMP_MAP, [GL.GL_R32F], depth=True)
+            solid = gl.Target(LAMP_MAP, LAMP_MAP, [GL.GL_R32F], depth=self._lamps[0][1] if self._lamps else True)
             solid.bind(clear=far, depth_test=True)
             program.use(lamp=matrix)
             self._skin.draw()
             for eye in self._eyes:
                 eye.draw()
-            hair = gl.Target(LAMP_MAP, LAMP_MAP, [GL.GL_R32F], depth=True)
+            hair = gl.Target(LAMP_MAP, LAMP_MAP, [GL.GL_R32F], depth=self._lamps[0][1] if self._lamps else solid)
             hair.bind(clear=far, depth_test=True)
             if strands is not None:
-                self._ribbons(lamp.towards, 0.16).draw()
+                ribbons = self._ribbons(lamp.towards, 0.16)
+                ribbons.draw()
+                ribbons.delete()
             self._lamps.append((matrix, solid, hair))
 
     def _ribbons(self, facing: np.ndarray, width_mm: float) -> gl.Mesh:
@@ -205,7 +206,7 @@ class Frame:
         order = np.argsort(-distance, kind="stable")  # far strands first: blended back to front
         points = strands.points[order].astype(np.float32)
         n, p = points.shape[:2]
-        tangent = np.gradient(points, axis=1)
+        tangent = np.gradient(points, axis=1)  # float32, as the points
         tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-6)
         root = strands.root_vertex[order]
         normal = r.model.skin.normals[root]
@@ -213,7 +214,7 @@ class Frame:
         environment = np.maximum(np.einsum("nci,ni->nc", light, normal), 0)
 
         def twice(array: np.ndarray) -> np.ndarray:
-            return np.repeat(array.reshape(n * p, -1), 2, axis=0)
+            return np.repeat(array.reshape(n * p, -1).astype(np.float32), 2, axis=0)
 
         side = np.tile([-1.0, 1.0], n * p)[:, None]
         width = twice(np.repeat(strands.width_mm[order][:, None], p, axis=1))
@@ -224,6 +225,7 @@ class Frame:
         program = r.program("passes/hair.frag", self._defines(), vertex="passes/hair.vert")
         program.use(**program.accepts(dict(self._lighting(), pixels_per_mm=self.view.pixels_per_mm, minimum_px=1.3, extinction=HAIR_EXTINCTION)))
         mesh.draw()
+        mesh.delete()
 
     def irradiance(self, translucent: bool) -> gl.Texture:
         """The input of the techniques: irradiance, with the transmitted light of Jimenez 2010 added or not."""
@@ -262,7 +264,7 @@ class Frame:
         gl.draw_fullscreen(r.context)
         image = np.rint(final.textures[0].read()[..., :3] * 255).astype(np.uint8)
         counts = info.read()
-        result = Result(image, np.rint(counts[..., 0]).astype(np.uint8), counts[..., 1].copy() if technique.measures_contrast else None, light.read())
+        result = Result(image, np.rint(counts[..., 0]).astype(np.uint8), counts[..., 1].copy() if technique.measures_contrast else None)
         for target in (scattered.target, colour, final):
             target.delete()
         return result

@@ -242,14 +242,15 @@ class Mesh:
         self.count = faces.size
         self.vertex_array = GL.glGenVertexArrays(1)
         GL.glBindVertexArray(self.vertex_array)
-        for where, array in attributes.items():
+        self._buffers = list(np.atleast_1d(GL.glGenBuffers(len(attributes) + 1)))
+        for buffer, (where, array) in zip(self._buffers, attributes.items(), strict=False):
             array = np.ascontiguousarray(array, dtype=np.float32)
-            GL.glBindBuffer(GL.GL_ARRAY_BUFFER, GL.glGenBuffers(1))
+            GL.glBindBuffer(GL.GL_ARRAY_BUFFER, buffer)
             GL.glBufferData(GL.GL_ARRAY_BUFFER, array.nbytes, array, GL.GL_STATIC_DRAW)
             GL.glEnableVertexAttribArray(where)
             GL.glVertexAttribPointer(where, array.shape[1], GL.GL_FLOAT, False, 0, None)
         faces = np.ascontiguousarray(faces, dtype=np.uint32)
-        GL.glBindBuffer(GL.GL_ELEMENT_ARRAY_BUFFER, GL.glGenBuffers(1))
+        GL.glBindBuffer(GL.GL_ELEMENT_ARRAY_BUFFER, self._buffers[-1])
         GL.glBufferData(GL.GL_ELEMENT_ARRAY_BUFFER, faces.nbytes, faces, GL.GL_STATIC_DRAW)
         GL.glBindVertexArray(0)
 
@@ -257,6 +258,10 @@ class Mesh:
         GL.glBindVertexArray(self.vertex_array)
         GL.glDrawElements(GL.GL_TRIANGLES, self.count, GL.GL_UNSIGNED_INT, None)
         GL.glBindVertexArray(0)
+
+    def delete(self) -> None:
+        GL.glDeleteVertexArrays(1, [self.vertex_array])
+        GL.glDeleteBuffers(len(self._buffers), self._buffers)
 
 
 def draw_fullscreen(context: Context) -> None:

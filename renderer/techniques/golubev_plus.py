@@ -52,10 +52,10 @@ class GolubevPlus(Golubev):
 
     def scatter(self, inputs: Inputs) -> Scattered:
         table = disc(self.samples, float(self.distances().max()))[self.order()]
-        program = inputs.programs("techniques/golubev_plus.glsl", {"SAMPLES": self.samples, "BASE": self.base_samples})
+        program = inputs.programs("techniques/golubev_plus.glsl", {"SAMPLES": self.samples})
         target = gl.Target(inputs.width, inputs.height, output_formats())
         target.bind()
-        program.use(samples=table, threshold=0.5 - self.offset, inner_mm=self.inner_radius * table[: self.base_samples, 2].max(),
+        program.use(samples=table, base=self.base_samples, threshold=0.5 - self.offset, inner_mm=self.inner_radius * table[: self.base_samples, 2].max(),
                     **self.uniforms(inputs))
         gl.draw_fullscreen(inputs.context)
         return Scattered(target)

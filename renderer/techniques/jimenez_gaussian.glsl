@@ -4,6 +4,7 @@ uniform float taps[7];
 uniform float sigma;          // mm, incremental
 uniform float alpha;          // pixels per mm of sigma at 1 m
 uniform float beta; uniform float gradient_limit; uniform float supersample;
+uniform int reach;  // 3 taps each way; no constant: an unrolled loop would run for pixels without skin too
 uniform vec2 axis; uniform vec3 weight; uniform vec3 sum_scale; uniform float samples; uniform int final;
 layout(location = 0) out vec4 blurred;
 layout(location = 1) out vec4 total;
@@ -20,7 +21,7 @@ void main() {
         vec2 stride = axis * sigma * alpha / (depth + beta * slope) / vec2(textureSize(source, 0));
         vec2 uv = gl_FragCoord.xy / vec2(textureSize(source, 0));
         sum = taps[3] * centre.rgb;
-        for (int k = -3; k <= 3; ++k) {
+        for (int k = -reach; k <= reach; ++k) {
             if (k == 0) continue;
             vec2 there = uv + float(k) * stride;
             // the stencil of the paper: what is not skin does not bleed in; the centre stands for it

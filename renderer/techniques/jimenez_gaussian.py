@@ -53,10 +53,10 @@ class JimenezGaussian(Technique):
         ping, pong = (gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F, GL.GL_RGBA32F]) for _ in range(2))
         total = gl.Target(inputs.width, inputs.height, output_formats())
         source, sum_so_far, blurs = inputs.irradiance, inputs.irradiance, self.blurs()
-        common = dict(irradiance=inputs.irradiance, depth_normal=inputs.depth_normal, taps=TAPS / TAPS.sum(),
+        common = dict(irradiance=inputs.irradiance, depth_normal=inputs.depth_normal, taps=TAPS / TAPS.sum(), reach=len(TAPS) // 2,
                       alpha=alpha * inputs.supersample, beta=self.beta, gradient_limit=self.gradient_limit,
                       supersample=float(inputs.supersample))
-        row = gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F, GL.GL_RGBA16F])
+        row = gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F])
         for k, (sigma, weight) in enumerate(blurs):
             last = k == len(blurs) - 1
             row.bind()

@@ -2,6 +2,7 @@
 #include "shaders/common.glsl"
 uniform sampler2D source; uniform sampler2D irradiance; uniform sampler2D depth_normal;
 uniform vec4 kernel[TAPS];       // rgb weight, offset in mm
+uniform int taps;                // no constant: an unrolled loop would run for pixels without skin too
 uniform vec2 axis;
 uniform float pixels_per_mm;     // at 1 mm
 uniform float follow_surface_mm;
@@ -21,7 +22,7 @@ void main() {
     float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
     mat2 turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
     vec3 sum = vec3(0.0);
-    for (int k = 0; k < TAPS; ++k) {
+    for (int k = 0; k < taps; ++k) {
         float offset = kernel[k].w;
         vec2 direction = abs(offset) < near_mm ? turn * axis : axis;
         vec2 there = uv + direction * offset * scale / size;
@@ -31,5 +32,5 @@ void main() {
         sum += kernel[k].rgb * mix(tap, centre.rgb, clamp(away, 0.0, 1.0));
     }
     scattered = vec4(sum, 1.0);
-    count.x = float(2 * TAPS);
+    count.x = float(2 * taps);
 }

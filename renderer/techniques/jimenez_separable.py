@@ -57,8 +57,8 @@ class JimenezSeparable(Technique):
         program = inputs.programs("techniques/jimenez_separable.glsl", {"TAPS": self.taps})
         near = self.near_share * np.ptp(offsets)
         common = dict(irradiance=inputs.irradiance, depth_normal=inputs.depth_normal, pixels_per_mm=inputs.pixels_per_mm * self.scale,
-                      kernel=np.column_stack([weights, offsets]), follow_surface_mm=self.follow_surface_mm, near_mm=near)
-        row = gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F, GL.GL_RGBA16F])
+                      kernel=np.column_stack([weights, offsets]), follow_surface_mm=self.follow_surface_mm, near_mm=near, taps=self.taps)
+        row = gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F])
         total = gl.Target(inputs.width, inputs.height, output_formats())
         for target, source, axis in ((row, inputs.irradiance, (1.0, 0.0)), (total, row.textures[0], (0.0, 1.0))):
             target.bind()

@@ -1,0 +1,64 @@
+"""What each technique costs: scattering alone, over the same shared buffers, in turn, so that drift hits all alike.
+
+Prints median wall and CPU milliseconds of one 1920x1080 frame at 2x2 supersampling, their ratio to golubev within this
+run, samples per scattering pixel, and what the techniques share. Software OpenGL is a processor's work: compare ratios.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+
+import numpy as np
+
+import renderer
+from renderer import gl
+from stimuli.heads import load_head
+
+ROUNDS = 5
+
+
+def timed(work) -> tuple[float, float]:
+    """Wall and CPU seconds of `work()` with the GPU's queue empty before and after."""
+    gl.finish()
+    wall, cpu = time.perf_counter(), time.process_time()
+    work()
+    gl.finish()
+    return time.perf_counter() - wall, time.process_time() - cpu
+
+
+def main() -> None:
+    techniques = {name: renderer.make(name) for name in renderer.TECHNIQUES}
+    start = time.perf_counter(), time.process_time()
+    head = load_head()
+    loaded = time.perf_counter() - start[0], time.process_time() - start[1]
+    with renderer.Renderer(head.model) as drawing:
+        print(f"{drawing.info()['gl_renderer']}, 1920x1080, 2x2 supersampling, {ROUNDS} rounds in turn, medians")
+        print(f"head: {loaded[0]:.1f} s wall, {loaded[1]:.1f} s CPU")
+        for framing in renderer.FRAMINGS:
+            frames = []
+            shared = timed(lambda: frames.append(drawing.frame(framing)))  # noqa: B023
+            frame = frames[0]
+            times = {name: [] for name in techniques}
+            samples = {}
+            for round_ in range(ROUNDS + 1):
+                for name, technique in techniques.items():
+                    inputs = frame.inputs(technique.translucent)
+                    out = []
+                    spent = timed(lambda: out.append(technique.scatter(inputs)))  # noqa: B023
+                    if round_:  # the first compiles shaders
+                        times[name].append(spent)
+                    count = out[0].target.textures[1].read()[..., 0]
+                    samples[name] = count[count > 0].mean()
+                    out[0].target.delete()
+            frame.close()
+            median = {name: np.median(np.array(rows), axis=0) for name, rows in times.items()}
+            print(f"\n{framing}: shared passes {shared[0]:.1f} s wall, {shared[1]:.1f} s CPU (once a framing)")
+            print(f"{'technique':<18}{'wall ms':>9}{'CPU ms':>9}{'wall/golubev':>14}{'CPU/golubev':>13}{'samples':>9}")
+            for name, (wall, cpu) in median.items():
+                print(f"{name:<18}{1e3 * wall:>9.0f}{1e3 * cpu:>9.0f}{wall / median['golubev'][0]:>14.2f}{cpu / median['golubev'][1]:>13.2f}{samples[name]:>9.2f}")
+    print(f"\npeak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()
