@@ -1,7 +1,8 @@
 """In plain words, from the numbers: what can be concluded, what cannot. Every sentence holds a number of the tables, or none.
 
 A difference is concluded where Holm's p of the declared test is at most 1 - level; that two techniques are as good as each other only
-where both one-sided tests put them within the declared margin. Everything else is undecided, and said to be.
+where the interval and, after Holm's correction, both one-sided tests put them within the declared margin. Everything else is undecided,
+and said to be.
 """
 
 from __future__ import annotations
@@ -38,18 +39,18 @@ def conclude(
     simulated: bool,
 ) -> Conclusions:
     """The sentences of a report, in the order in which they are to be read."""
-    found = Conclusions()
+    found, who = Conclusions(), "simulated participants" if simulated else "people"
     alpha = alpha_of(options)
     pairs = tables["pairs"]
     for framing, rows in pairs[pairs.framing != OVERALL].groupby("framing", sort=False):
-        _about_pairs(found, framing_label(codebook, framing), rows, codebook, options, alpha)
+        _about_pairs(found, framing_label(codebook, framing), rows, codebook, options, alpha, who)
     if not (options.margin or options.margin_jod):
         found.cannot.append(
             "No margin of equivalence was declared before the data, so that no two techniques can be called as good as each other; "
             "that a test finds no difference does not make them equal."
         )
     _about_trend(found, tables["trend"], codebook, alpha)
-    _about_agreement(found, tables["agreement"], codebook, alpha)
+    _about_agreement(found, tables["agreement"], codebook, alpha, who.capitalize())
     _about_familiarity(found, tables["familiarity_interaction"], codebook, alpha)
     _about_exclusions(found, tables["participants"], tables["sensitivity"], people)
     missing = [line for name in ("worths", "pairs") for line in notes.get(name, ()) if "no finite" in line]
@@ -65,7 +66,7 @@ def conclude(
 
 
 def _about_pairs(
-    found: Conclusions, where: str, rows: pd.DataFrame, codebook: Codebook, options: Options, alpha: float
+    found: Conclusions, where: str, rows: pd.DataFrame, codebook: Codebook, options: Options, alpha: float, who: str
 ) -> None:
     by = {key: [] for key in ("different", "equivalent", "both", "undecided")}
     for row in rows.itertuples():
@@ -82,7 +83,7 @@ def _about_pairs(
         largest = probability(max(row.holm_p for row in differing))
         most = largest if largest.startswith("<") else f"at most {largest}"
         found.can.append(
-            f"{where}: people preferred {words} ({_test(options)}, p {most} after Holm's correction; "
+            f"{where}: {who} preferred {words} ({_test(options)}, p {most} after Holm's correction; "
             f"{len(differing)} of {len(rows)} pairs)."
         )
     for row in by["equivalent"] + by["both"]:
@@ -91,13 +92,20 @@ def _about_pairs(
             words = f"{where}: {a} and {b} are as good as each other within the declared margin of {options.margin:g} points"
             words += f": the mean preference for {b} is {number(row.mean_preference, sign=True)}"
             words += f", interval {number(row.equivalence_low, sign=True)} to {number(row.equivalence_high, sign=True)}"
-            words += f" (two one-sided tests, p {_equals(row.tost_p)}, {_equals(row.tost_holm_p)} after Holm's correction)."
+            words += f" (two one-sided tests, p {_equals(row.tost_holm_p)} after Holm's correction)."
         else:
             words = f"{where}: {a} and {b} are as good as each other within the declared margin of {options.margin_jod:g} JOD"
             words += f": {b} is {number(row.jod, sign=True)} JOD above {a}."
         if row in by["both"]:
             words += " The difference is real, and small."
         found.can.append(words)
+    for row in by["undecided"] + by["different"]:
+        if row.equivalent == 1:
+            found.cannot.append(
+                f"{where}: {codebook.label(row.a)} and {codebook.label(row.b)} come within the margin of {options.margin:g} points when "
+                f"taken alone (two one-sided tests, p {_equals(row.tost_p)}), which holds only if this pair was singled out before the "
+                f"data; after Holm's correction over all pairs it does not (p {_equals(row.tost_holm_p)})."
+            )
     untested = [row for row in rows.itertuples() if not np.isfinite(row.holm_p)]
     if untested:
         found.cannot.append(f"{where}: too few answers to test {_pairs(untested, codebook)}.")
@@ -127,7 +135,7 @@ def _about_trend(found: Conclusions, trend: pd.DataFrame, codebook: Codebook, al
         found.cannot.append(f"Whether preferences weaken or grow along the framings: {words}.")
 
 
-def _about_agreement(found: Conclusions, agreement: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
+def _about_agreement(found: Conclusions, agreement: pd.DataFrame, codebook: Codebook, alpha: float, who: str) -> None:
     rows = agreement[agreement.framing != OVERALL].set_index(["framing", "statistic"])
     agree: dict[bool, list[str]] = {True: [], False: []}
     for framing in dict.fromkeys(agreement.framing[agreement.framing != OVERALL]):
@@ -138,15 +146,15 @@ def _about_agreement(found: Conclusions, agreement: pd.DataFrame, codebook: Code
             agree[bool(tested[0].p <= alpha)].append(words)
     if agree[True]:
         found.can.append(
-            f"People agree with each other more than chance would: Kendall's u is {listed(agree[True])}; 1 would be full agreement."
+            f"{who} agree with each other more than chance would: Kendall's u is {listed(agree[True])}; 1 would be full agreement."
         )
     if agree[False]:
-        found.cannot.append(f"Whether people agree with each other more than chance would: Kendall's u is {listed(agree[False])}.")
+        found.cannot.append(f"Whether {who.lower()} agree with each other more than chance would: Kendall's u is {listed(agree[False])}.")
     side = rows[rows.index.get_level_values("statistic") == "left_share"] if len(rows) else rows
     leaning = [(framing, one) for (framing, _), one in side.iterrows() if np.isfinite(one.p) and one.p <= alpha]
     if leaning:
         words = listed([f"{100 * one.value:.0f} % at {framing_label(codebook, framing)} (p {_equals(one.p)})" for framing, one in leaning])
-        found.can.append(f"People lean to one side: of their preferences, the left image got {words}; sides were shuffled against that.")
+        found.can.append(f"{who} lean to one side: of their preferences, the left image got {words}; sides were shuffled against that.")
 
 
 def _about_familiarity(found: Conclusions, table: pd.DataFrame, codebook: Codebook, alpha: float) -> None:

@@ -15,6 +15,9 @@ from pathlib import Path
 from .errors import InputError
 from .options import Exclusions, Options
 
+#: Where margins and rules come from, when no study file declares any.
+UNDECLARED = "no margin or rule was declared in a study file: the defaults of subdermal"
+
 
 def read_declared(path: str | Path) -> dict:
     """`study.analysis` of a manifest.json (or of the folder that holds it); empty where it declares nothing."""

@@ -1,6 +1,6 @@
-"""The thesis's figures 5.3 to 5.9, for any response table, at journal column width.
+"""The thesis's figures 5.3 to 5.9, for any response table, at the widths of a journal's columns.
 
-Okabe-Ito palette (safe for colour-blind readers), outlined fonts, the same bytes on every run.
+Okabe-Ito palette (safe for colour-blind readers), outlined fonts in SVG and embedded ones in PDF, the same bytes on every run.
 Every figure of simulated answers carries a mark that says so.
 """
 
@@ -15,6 +15,9 @@ import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
@@ -32,7 +35,9 @@ GREY, INK = "#C8C8C8", "#222222"
 ANSWERS = (BLUE, SKY, GREY, ORANGE, VERMILLION)
 ON_ANSWERS = ("white", INK, INK, INK, "white")
 
-WIDTH_IN, NARROW_IN = 7.0, 4.6
+#: One and two columns of a journal page: ACM's two-column format; the text of its one-column journals is between the two.
+SINGLE_MM, DOUBLE_MM = 84.7, 177.8
+WIDTH_IN, NARROW_IN = DOUBLE_MM / 25.4, SINGLE_MM / 25.4
 BANNER_IN = 0.26
 RC = {
     "font.family": "DejaVu Sans",
@@ -53,9 +58,10 @@ RC = {
     "grid.linewidth": 0.6,
     "legend.frameon": False,
     "svg.fonttype": "path",
+    "pdf.fonttype": 42,
     "svg.hashsalt": "subdermal",
     "figure.dpi": 100,
-    "savefig.dpi": 200,
+    "savefig.dpi": 300,
 }
 
 
@@ -69,6 +75,12 @@ class Picture:
     alt: str
     svg: bytes
     png: bytes
+    pdf: bytes
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """The picture in every form: path inside the output folder -> content."""
+        return {f"figures/{self.name}.{kind}": getattr(self, kind) for kind in ("pdf", "png", "svg")}
 
 
 def _picture(
@@ -80,10 +92,16 @@ def _picture(
         if simulated:
             _mark(figure)
         about = f"{SIMULATED}. {title}" if simulated else title
-        svg, png = io.BytesIO(), io.BytesIO()
-        figure.savefig(svg, format="svg", metadata={"Date": None, "Title": about})
-        figure.savefig(png, format="png", metadata={"Title": about})
-    return Picture(name, title, caption, f"{SIMULATED}. {alt}" if simulated else alt, svg.getvalue(), png.getvalue())
+        # laid out once, at the resolution of the PNG, and then drawn once for each form: savefig would do both three times
+        figure.dpi = matplotlib.rcParams["savefig.dpi"]
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        png, svg, pdf = io.BytesIO(), io.BytesIO(), io.BytesIO()
+        FigureCanvasAgg(figure).print_png(png, metadata={"Title": about})
+        FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Title": about})
+        FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None, "Title": about})
+    alt = f"{SIMULATED}. {alt}" if simulated else alt
+    return Picture(name, title, caption, alt, svg.getvalue(), png.getvalue(), pdf.getvalue())
 
 
 def _mark(figure: Figure) -> None:
@@ -169,10 +187,10 @@ def _familiarity(table: pd.DataFrame) -> Figure:
     ax.barh(table.level, table.participants, height=0.66, color=BLUE)
     for level, count in zip(table.level, table.participants, strict=True):
         _value(ax, count, level, f"{count}")
-    ax.set_yticks(table.level, [_wrapped(label, 28) for label in table.label])
+    ax.set_yticks(table.level, [_wrapped(label, 18) for label in table.label])
     ax.set_ylim(5.5, 0.5)
-    ax.set_xlim(0, max(table.participants.max(), 1) * 1.1)
-    ax.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    ax.set_xlim(0, max(table.participants.max(), 1) * 1.15)
+    ax.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     ax.grid(axis="x")
     ax.set_xlabel("participants")
     return figure
@@ -183,7 +201,7 @@ def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], axis: str, li
     distance = np.arange(1, len(table) + 1)
     if line is not None:
         ends = np.array([0.75, len(table) + 0.25])
-        fit = f"linear fit: {line.slope:+.1f} points per framing".replace("-", "\N{MINUS SIGN}")
+        fit = f"line: {line.slope:+.1f} points a framing".replace("-", "\N{MINUS SIGN}")
         fit += f", R² = {line.r2:.2f}" if np.isfinite(line.r2) else ""
         ax.plot(ends, line.intercept + line.slope * ends, "--", color=VERMILLION, linewidth=1.2, label=fit)
     ax.plot(distance, table.total, "o", markersize=6, color=BLUE, label="total of all techniques")
@@ -191,14 +209,14 @@ def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], axis: str, li
         below = line is not None and total < line.intercept + line.slope * x
         place = {"xytext": (0, -8 if below else 7), "textcoords": "offset points", "va": "top" if below else "bottom"}
         ax.annotate(f"{total}", (x, total), ha="center", size=7.5, **place)
-    ax.set_xticks(distance, [_wrapped(label, max(6, min(16, 54 // len(labels)))) for label in labels])
+    ax.set_xticks(distance, [_wrapped(label, max(6, min(14, 40 // len(labels)))) for label in labels])
     ax.set_xlim(0.6, len(table) + 0.4)
     ax.set_ylim(0, max(table.total.max(), 1) * 1.18)
     ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     ax.grid(axis="y")
     ax.set_ylabel("points")
     ax.set_xlabel(axis)
-    ax.legend(loc="lower left")
+    ax.legend(loc="lower left", fontsize=7, handlelength=1.6)
     return figure
 
 
@@ -270,13 +288,14 @@ def _pair(values: Mapping[str, np.ndarray], pair: tuple[str, str], codebook: Cod
             ax.plot(value + x, place + 2 * y, "o", color=INK, markersize=min(3.2, 36 * gap), markeredgewidth=0, zorder=5)
     a, b = (codebook.label(name) for name in pair)
     ax.set_yticks(
-        places, [f"{_wrapped(codebook.framing_label(name))}\n(n = {len(values[name])})" for name in values]
+        places, [f"{_wrapped(codebook.framing_label(name), 12)}\n(n = {len(values[name])})" for name in values]
     )
     ax.set_ylim(len(values) - 0.5, -0.5)
     ax.set_xlim(-2.45, 2.45)
     ax.set_xticks(
         range(-2, 3),
-        [f"strong for\n{_wrapped(a, 15)}", "slight", "no difference", "slight", f"strong for\n{_wrapped(b, 15)}"],
+        [f"strong for\n{_wrapped(a, 11)}", "slight", "none", "slight", f"strong for\n{_wrapped(b, 11)}"],
+        size=7,
     )
     ax.grid(axis="x")
     return figure

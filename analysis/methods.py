@@ -154,7 +154,8 @@ def _equivalence(options: Options, alpha: float, declared: str) -> str:
     if options.margin:
         words.append(
             f"Two techniques are called as good as each other where two one-sided t tests [schuirmann1987] at {alpha:g} and the "
-            f"{100 * (1 - 2 * alpha):g} % bootstrap interval both put the mean preference within \N{PLUS-MINUS SIGN}{options.margin:g} points"
+            f"{100 * (1 - 2 * alpha):g} % bootstrap interval both put the mean preference within \N{PLUS-MINUS SIGN}{options.margin:g} points, the tests corrected by Holm's "
+            "procedure like those of difference"
         )
     if options.margin_jod:
         words.append(

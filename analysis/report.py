@@ -1,4 +1,5 @@
-"""Puts tables, figures and words together: `tables/*.csv`, `figures/*.svg` and `.png`, and `report.html`, one page to read.
+"""Puts tables, figures and words together: `tables/*.csv`, `figures/*.pdf`, `.svg` and `.png`, `report.tex`, `methods.md`, `report.pdf`
+and `report.html`, one page to read.
 
 Everything is made in memory first and then written file by file, each one whole or not at all; the report comes last.
 """
@@ -7,34 +8,49 @@ from __future__ import annotations
 
 import base64
 import os
-import platform
 import re
 import tempfile
 from collections.abc import Iterable, Mapping
-from importlib import metadata
 from pathlib import Path
 
 import jinja2
 import numpy as np
 import pandas as pd
 
-from . import ahp, figures, tallies
+from . import ahp, compute, conclusions, figures, latex, methods, objective, shown, tallies, worth_figures
 from .ahp import Comparison, Priorities
 from .codebook import Codebook
+from .conclusions import count as _count
+from .conclusions import listed as _listed
+from .declared import UNDECLARED
 from .errors import InputError
+from .methods import versions as _versions
+from .objective import Measured
+from .options import Options
 from .responses import Responses
+from .shown import NOTHING
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "templates" / "report"
 RULE = "Medians are taken above the diagonal, in this order of techniques, and inverted below it."
+SIMULATED_SENTENCE = "These answers were made by a program: no person was asked, and nothing here says how skin looks."
 #: How many unusable rows the page shows; tables/rejected_rows.csv holds all.
 SHOWN_ROWS = 100
 
 
-def report_responses(responses: Responses, pair: tuple[str, str] | None = None, command: str = "") -> dict[str, bytes]:
+def report_responses(
+    responses: Responses,
+    pair: tuple[str, str] | None = None,
+    command: str = "",
+    options: Options | None = None,
+    declared: str = UNDECLARED,
+    measured: Measured | None = None,
+) -> dict[str, bytes]:
     """All files of the analysis of a response table: path inside the output folder -> content.
 
     pair: the two techniques of the box plot; without it golubev and golubev_plus where both are present, else the first two.
+    options: the choices of the analysis, and `declared`, where they come from; measured: what the manifest holds of cost and fidelity.
     """
+    options = options or Options()
     codebook = responses.codebook
     pair = _pair(responses, pair)
     slugs = file_names(responses.items)
@@ -54,18 +70,61 @@ def report_responses(responses: Responses, pair: tuple[str, str] | None = None, 
             columns=["line", "last_line", "kind", "reason", "row"],
         ),
     } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
+    results = compute.everything(responses, options)
+    tables |= results.tables
+    beside, correlated = None, None
+    if measured is not None:
+        beside = objective.against_worth(measured.table, results.tables["worths"])
+        correlated = objective.correlations(beside)
+        tables |= {"objective": beside, "objective_correlations": correlated}
     if responses.simulated:
         tables = {name: table.assign(simulated=1) for name, table in tables.items()}
 
+    simulated, alpha = responses.simulated, shown.alpha_of(options)
     pictures = figures.draw_responses(responses, found, pair, slugs)
+    pictures += worth_figures.draw_results(results.tables, codebook, options.margin, alpha, simulated)
+    said = []
+    if measured is not None:
+        for measure, rows in beside.groupby("measure", sort=False):
+            about = objective.MEASURES[measure]
+            pictures.append(worth_figures.draw_objective(rows, measure, about, codebook, simulated))
+        said = objective.sentences(beside, correlated, measured.notes, codebook)
+    read = shown.all_shown(results.tables, codebook, options)
+    concluded = conclusions.conclude(results.tables, results.notes, codebook, options, responses.participants, simulated)
+    counted = _summary(responses, scores, totals, sides, comparisons, found, pair)
+    title = codebook.title or "Answers to pairs of images"
+    subtitle = "Which of two images looks more realistic: what was answered, what follows from it, and what does not."
+    summary = [
+        *([("Simulated", [SIMULATED_SENTENCE])] if simulated else []),
+        ("What can be concluded", concluded.can),
+        ("What cannot be concluded", concluded.cannot),
+        ("What was counted", counted),
+        *([("Cost and fidelity beside worth", said)] if said else []),
+    ]
+    text = methods.paragraphs(responses, options, declared)
+    used = "".join(words for _, words in text)
+    cited = {key: place for place, key in enumerate((key for key in methods.REFERENCES if f"[{key}]" in used), start=1)}
+    references = [methods.REFERENCES[key] for key in cited]
+    numbered = [(heading, methods.cited(words, cited)) for heading, words in text]
+    more = {
+        "methods.md": methods.markdown(responses, options, declared, command).encode(),
+        "report.tex": latex.document(read.values(), title, simulated).encode(),
+        "report.pdf": _pdf(title, subtitle, summary, pictures, list(read.values()), numbered, references, simulated),
+    }
     first, last = (f"{time:%Y-%m-%d}" for time in (responses.frame.started_at.min(), responses.frame.started_at.max()))
     return _files(
         tables,
         pictures,
-        title=codebook.title or "Answers to pairs of images",
-        subtitle="Which of two images looks more realistic: what was answered, and how it was counted.",
-        simulated=responses.simulated,
-        summary=_summary(responses, scores, totals, sides, comparisons, found, pair),
+        more,
+        title=title,
+        subtitle=subtitle,
+        simulated=simulated,
+        summary=[(heading, sentences) for heading, sentences in summary if sentences],
+        shown=read,
+        remarks={name: [_plain(line, codebook) for line in lines] for name, lines in results.notes.items()},
+        methods=numbered,
+        references=references,
+        declared=declared,
         counts=[
             ("participant", responses.participants),
             ("answer", len(responses.frame)),
@@ -108,13 +167,19 @@ def report_matrices(comparisons: Mapping[str, Comparison], source: str = "", com
     return _files(
         tables,
         [figures.draw_priorities(shares, found, codebook)],
+        {},
         title="Priorities from matrices of judgements",
         subtitle="The matrices as given, their priorities and how coherent they are.",
         simulated=False,
         summary=[
-            f"{codebook.framing_label(name)}: highest priority for {_listed(_first(share, codebook))}, "
-            f"{max(share.values()):.3f}. {_coherence(found[name])}"
-            for name, share in shares.items()
+            (
+                "",
+                [
+                    f"{codebook.framing_label(name)}: highest priority for {_listed(_first(share, codebook))}, "
+                    f"{max(share.values()):.3f}. {_coherence(found[name])}"
+                    for name, share in shares.items()
+                ],
+            )
         ],
         counts=[("technique", len(items)), ("framing", len(comparisons))],
         matrices=_matrices(comparisons, found, codebook),
@@ -164,14 +229,16 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
     return slugs
 
 
-def _files(tables: Mapping[str, pd.DataFrame], pictures: list[figures.Picture], **page: object) -> dict[str, bytes]:
+def _files(
+    tables: Mapping[str, pd.DataFrame], pictures: list[figures.Picture], more: Mapping[str, bytes], **page: object
+) -> dict[str, bytes]:
     files = {
         f"tables/{name}.csv": table.to_csv(index=False, float_format="%.10g", lineterminator="\n").encode()
         for name, table in tables.items()
     }
     for picture in pictures:
-        files[f"figures/{picture.name}.svg"] = picture.svg
-        files[f"figures/{picture.name}.png"] = picture.png
+        files |= picture.files
+    files |= more
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -186,18 +253,22 @@ def _files(tables: Mapping[str, pd.DataFrame], pictures: list[figures.Picture], 
     return files
 
 
-def _versions() -> dict[str, str]:
-    versions = {"Python": platform.python_version()}
-    for name in ("subdermal", "numpy", "pandas", "matplotlib"):
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            versions[name] = "not installed as a package"
-    return versions
+def _pdf(*parts: object) -> bytes:
+    from . import pdf
+
+    return pdf.make(*parts)
+
+
+def _plain(line: str, codebook: Codebook) -> str:
+    """A note of the computation as a sentence of the page."""
+    name, mark, rest = line.partition(":")
+    if mark and name in codebook.framings:
+        line = f"{codebook.framing_label(name)}:{rest}"
+    return line[:1].upper() + line[1:].rstrip(".") + "."
 
 
 def _digits(value: float | None, digits: int = 3) -> str:
-    return "none" if value is None or np.isnan(value) else f"{value:z.{digits}f}"
+    return NOTHING if value is None or np.isnan(value) else f"{value:z.{digits}f}"
 
 
 def _pair(responses: Responses, pair: tuple[str, str] | None) -> tuple[str, str]:
@@ -256,8 +327,6 @@ def _summary(
     """What the numbers say, in sentences that hold for these answers and claim no more."""
     codebook, frame = responses.codebook, responses.frame
     sentences = []
-    if responses.simulated:
-        sentences.append("These answers were made by a program: no person was asked, and nothing here says how skin looks.")
     people = _count(responses.participants, "simulated participant" if responses.simulated else "participant")
     unused = f"{_count(len(responses.findings), 'row')} of the table could not be used; see below."
     sentences.append(
@@ -313,10 +382,6 @@ def _summary(
         f"Over all answers the image on the left was preferred {sides.left.sum()} times, the one on the right "
         f"{sides.right.sum()} times; no difference was seen {sides.none.sum()} times."
     )
-    sentences.append(
-        "These are counts of these answers. No test was made of whether other people would answer alike, "
-        "and where no preference shows, that alone does not make two techniques equal."
-    )
     return sentences
 
 
@@ -329,11 +394,3 @@ def _coherence(found: Priorities) -> str:
     if found.cr is None:
         return f"There is {found.verdict}."
     return f"The judgements are {found.verdict}, CR {found.cr:z.3f}."
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

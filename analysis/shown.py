@@ -106,6 +106,7 @@ def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
             probability(row.sign_p),
             probability(row.holm_p),
             probability(row.tost_p),
+            probability(row.tost_holm_p),
             number(row.rank_biserial),
             interval(row.jod, row.jod_low, row.jod_high),
             VERDICTS[verdict(row, alpha)][0],
@@ -117,12 +118,13 @@ def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
         "Every pair: answers, tests and what they come to",
         (
             "Framing", "A", "B", "n", "Answers", "Mean preference for B", "Wilcoxon p", "Sign p", "Holm p", "TOST p",
-            "Rank-biserial", "JOD, B less A", "Verdict",
+            "TOST Holm p", "Rank-biserial", "JOD, B less A", "Verdict",
         ),
-        (False, False, False, *[True] * 9, False),
+        (False, False, False, *[True] * 10, False),
         tuple(rows),
         "Answers: strong for A / slight for A / no difference / slight for B / strong for B. Positive numbers favour B. "
-        f"Holm's correction is of the {_test(options)}, over the pairs of {_family(options)}; the verdict is at {alpha:g}.",
+        f"Holm's correction is of the {_test(options)} and of the two one-sided tests (TOST), over the pairs of {_family(options)}; "
+        f"the verdict is at {alpha:g}.",
     )  # fmt: skip
 
 

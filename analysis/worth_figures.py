@@ -50,9 +50,16 @@ def framing_label(codebook: Codebook, name: str) -> str:
 
 
 def verdict(row: object, alpha: float) -> str:
-    """What a row of pairs.csv comes to, as a key of `VERDICTS`."""
+    """What a row of pairs.csv comes to, as a key of `VERDICTS`; both tests are taken after Holm's correction.
+
+    As good as each other: within the margin by the interval (`equivalent`) and by both one-sided tests. Where a margin was declared in
+    JOD alone there is no such test, and the interval decides.
+    """
     differs = row.holm_p <= alpha
-    equal = (row.equivalent if np.isfinite(row.equivalent) else row.jod_equivalent) == 1
+    if np.isfinite(row.equivalent):
+        equal = row.equivalent == 1 and row.tost_holm_p <= alpha
+    else:
+        equal = row.jod_equivalent == 1
     return "both" if differs and equal else "different" if differs else "equivalent" if equal else "undecided"
 
 
@@ -217,7 +224,7 @@ def draw_pairs(
         "Every difference, with its interval" + (" and the margin" if margin else ""),
         "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: left of 0 for the first technique, right for the second. "
         + about
-        + "Colour and marker say what the tests come to after Holm's correction.",
+        + "Colour and marker say what the tests come to after Holm's correction, for differences and for equivalence.",
         "; ".join(
             f"{framing_label(codebook, row.framing)}: {codebook.label(row.a)} against {codebook.label(row.b)} "
             f"{row.mean_preference:+z.2f}, {VERDICTS[one][0]}"
@@ -312,7 +319,8 @@ def draw_agreement(agreement: pd.DataFrame, codebook: Codebook, simulated: bool 
     return figures._picture(
         "agreement",
         "Consistency and agreement",
-        "1 is perfect; 0 is what chance gives. Lines are intervals where there are any.",
+        "1 is perfect. For zeta 0 is as many circular triads as there can be, for u and alpha 0 is what chance gives. "
+        "Lines are intervals where there are any.",
         "; ".join(
             f"{framing_label(codebook, row.framing)}: {DRAWN[row.statistic]} {row.value:z.2f}" for row in found.itertuples()
         ),

@@ -47,6 +47,19 @@ def names(ctx: click.Context, parameter: click.Parameter, value: str | None) -> 
     metavar="FILE.toml",
     help="Instead of RESPONSES: `items = [names]` and for each framing `[matrix.NAME]` with `rows = [[1, 0.5, ...], ...]`.",
 )
+@click.option(
+    "--reference",
+    default="reference",
+    show_default=True,
+    help="The technique whose images are the reference: with a manifest, DSSIM to them is set beside worth.",
+)
+@click.option("--margin", type=float, help="As good as each other: within this many points of 0, on the scale from -2 to 2. Else as declared.")
+@click.option("--margin-jod", type=float, help="The same in JOD. Without it as the study declares, or none.")
+@click.option("--test", type=click.Choice(["wilcoxon", "sign"]), help="The declared test. Without it as the study declares, or wilcoxon.")
+@click.option("--family", type=click.Choice(["study", "framing"]), help="Pairs that Holm's correction guards together: of all framings, or of each.")
+@click.option("--resamples", type=int, help="How often participants are resampled. Without it as the study declares, or 1000.")
+@click.option("--seed", type=int, help="Draws the resamples; the same seed gives the same numbers. Without it as declared, or 0.")
+@click.option("--level", type=float, help="Level of the intervals, 0.95 without it; tests are at one less this level.")
 def command(
     responses: Path | None,
     out: Path,
@@ -54,20 +67,26 @@ def command(
     pair: tuple[str, str] | None,
     study: Path | None,
     matrices: Path | None,
+    reference: str,
+    **choices: object,
 ) -> None:
     """Turn the answers in RESPONSES, a responses.csv, into tables, figures and a report to read.
 
     Rows that cannot be used are named with their line numbers, counted, and listed in the report.
     """
+    from analysis import declared as declarations
     from analysis.ahp import read_matrices
     from analysis.codebook import is_manifest, read_manifest
+    from analysis.objective import read_measures
     from analysis.report import report_matrices, report_responses, write_files
     from analysis.responses import read_responses
 
     if (responses is None) == (matrices is None):
         raise click.UsageError("expected either RESPONSES or --matrices FILE.toml")
     if matrices is not None:
-        unused = [option for option, value in (("--order", order), ("--pair", pair), ("--study", study)) if value]
+        given = {f"--{name.replace('_', '-')}": value for name, value in choices.items()}
+        given = {"--order": order, "--pair": pair, "--study": study, **given}
+        unused = [option for option, value in given.items() if value is not None]
         if unused:
             raise click.UsageError(f"{', '.join(unused)} cannot go with --matrices, which has its own names and order")
         found = read_matrices(matrices)
@@ -86,9 +105,20 @@ def command(
     answers = read_responses(responses, study and read_manifest(study), order)
     answers = replace(answers, notes=notes + answers.notes)
     options = [(option, ",".join(value)) for option, value in (("--order", order), ("--pair", pair)) if value]
+    options += [(f"--{name.replace('_', '-')}", str(value)) for name, value in choices.items() if value is not None]
     if study is not None:
         options.append(("--study", study.name))
-    write_files(report_responses(answers, pair, _written((responses.name,), *options)), out)
+    declared = declarations.read_declared(study) if study is not None else {}
+    chosen = declarations.options(declared, f"{study}: study.analysis", **choices)
+    files = report_responses(
+        answers,
+        pair,
+        _written((responses.name,), *options),
+        chosen,
+        _source(declared, choices),
+        read_measures(study, reference) if study is not None else None,
+    )
+    write_files(files, out)
 
     for finding in answers.findings[:SHOWN_ROWS]:
         click.echo(f"{responses}: {finding}", err=True)
@@ -100,6 +130,15 @@ def command(
         f"{out / 'report.html'}: {len(answers.frame)} {kind} of {answers.participants} participants"
         + (f"; {unused} of {answers.rows} rows not used, see {out / 'tables/rejected_rows.csv'}" if unused else "")
     )
+
+
+def _source(declared: dict, choices: dict) -> str:
+    """Where margins and rules come from, in words."""
+    from analysis.declared import UNDECLARED
+
+    given = [name.replace("_", " ") for name, value in choices.items() if value is not None]
+    source = "declared in the study file" if declared else UNDECLARED
+    return f"{source}; {', '.join(given)} as given on the command line" if given else source
 
 
 def _written(*parts: tuple[str, ...]) -> str:

@@ -42,6 +42,19 @@ def answer():
     return answer
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures without their drawing, which takes most of a report's time: for tests of words and tables."""
+    from analysis import figures
+
+    svg = b'<svg xmlns="http://www.w3.org/2000/svg" width="240pt" height="120pt" viewBox="0 0 240 120"/>'
+
+    def picture(name, title, caption, alt, draw, *args, simulated=False):
+        return figures.Picture(name, title, caption, f"{figures.SIMULATED}. {alt}" if simulated else alt, svg, b"png", b"pdf")
+
+    monkeypatch.setattr(figures, "_picture", picture)
+
+
 @pytest.fixture(scope="session")
 def random_study():
     """random_study(people, seed) -> rows of a whole study: every pair at every framing, sides and order shuffled."""
@@ -64,3 +77,80 @@ def random_study():
         return table
 
     return rows
+
+
+def _crowd(people, worth, seed=0, framing="close-up", taste=0.0, leaning=0.0, side=0.0, cuts=(0.6, 2.0), noise="logistic"):
+    """A panel of people who answer every pair of len(worth) techniques a, b, c, ... by the ordinal model of analysis.worth."""
+    from analysis.panel import Panel
+
+    rng = np.random.default_rng(seed)
+    worth = np.asarray(worth, float)
+    first, second = (np.array(column) for column in zip(*combinations(range(len(worth)), 2), strict=True))
+    left = rng.random((people, len(first))) < 0.5
+    own = worth + rng.normal(0, taste, (people, len(worth)))
+    lean = side + rng.normal(0, leaning, (people, 1))
+    error = getattr(rng, noise)(size=left.shape)
+    eta = own[:, second] - own[:, first] + np.where(left, 1, -1) * lean + error
+    preference = (np.digitize(eta, [-cuts[1], -cuts[0], cuts[0], cuts[1]]) - 2).astype(np.int8)
+    names = np.array([f"P{person:04d}" for person in range(people)], object)
+    return Panel(framing, tuple("abcdefghijk"[: len(worth)]), names, first, second, preference, left)
+
+
+@pytest.fixture(scope="session")
+def crowd():
+    """crowd(people, worth, seed=0, taste=0, leaning=0, side=0, cuts=(0.6, 2)) -> analysis.panel.Panel."""
+    return _crowd
+
+
+@pytest.fixture(scope="session")
+def table():
+    """table(*panels, familiarity=None, seed=0) -> Responses with the answers of the panels; familiarity: participant -> 1 to 5."""
+    from analysis import responses_from_records
+
+    def table(*panels, familiarity=None, seed=0, order=None):
+        rng = np.random.default_rng(seed)
+        records = []
+        for panel in panels:
+            for person, k in zip(*np.nonzero(panel.answered), strict=True):
+                pair = panel.items[panel.first[k]], panel.items[panel.second[k]]
+                left = bool(panel.first_left[person, k])
+                value = int(panel.preference[person, k])
+                records.append(
+                    {
+                        "participant": panel.participants[person],
+                        "familiarity": 3 if familiarity is None else familiarity[panel.participants[person]],
+                        "framing": panel.framing,
+                        "left": pair[0 if left else 1],
+                        "right": pair[1 if left else 0],
+                        "answer": value if left else -value,
+                        "order": len(records) + 1,
+                        "rt_ms": int(rng.lognormal(8.5, 0.5)),
+                        "started_at": "2024-05-01T09:00:00Z",
+                    }
+                )
+        return responses_from_records(records, order=order)
+
+    return table
+
+
+@pytest.fixture
+def lines(write, answer):
+    """lines("a<<b a=b b>c ...", ...) -> Responses at close-up: one text a participant, < and > point to the technique that lost ...
+
+    a>b: a slightly preferred, a>>b: strongly; a<b, a<<b: the other way; a=b: no difference.
+    """
+    import re
+
+    from analysis import read_responses
+
+    def lines(*people, framing="close-up"):
+        values = {">>": -2, ">": -1, "=": 0, "<": 1, "<<": 2}
+        rows = []
+        for person, text in enumerate(people):
+            for word in text.split():
+                left, mark, right = re.fullmatch(r"(\w+)([<>=]+)(\w+)", word).groups()
+                rows.append(answer(f"P{person:03d}", framing, left, right, values[mark]))
+        names = sorted({name for text in people for name in re.findall(r"\w+", text)})
+        return read_responses(write(rows), order=names)
+
+    return lines
