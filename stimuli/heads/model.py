@@ -7,7 +7,7 @@ from scipy import sparse
 
 from renderer.scene import MASKS, Model, Proxy, Skin
 from stimuli.heads import eyes, hair, skin
-from stimuli.heads.mpfb import Anatomy, Bust
+from stimuli.heads.mpfb import Anatomy, Bust, Eyeball
 from stimuli.heads.subdivide import triangles
 
 
@@ -76,10 +76,33 @@ def _scan_landmarks(p: np.ndarray, eye_points: np.ndarray | None) -> dict[str, n
     return {"eyes": eyes, "eye_l": eyes + side, "eye_r": eyes - side, "nose": nose, "mouth": np.array([middle, eyes[1] - 70, nose[2] - 12])}
 
 
+def _own_eyes(points: np.ndarray) -> tuple[Eyeball, ...]:
+    """The balls that an uncoloured scan's eye parts (N, 3) take up, left of the person first."""
+    middle = 0.5 * (points[:, 0].min() + points[:, 0].max())
+    sides = [points[points[:, 0] > middle], points[points[:, 0] <= middle]]
+    if min(map(len, sides)) < 8:
+        return ()
+    balls = []
+    for side in sides:
+        low, high = side.min(axis=0), side.max(axis=0)
+        radius = 0.25 * ((high - low)[0] + (high - low)[1])
+        balls.append(Eyeball(np.array([*(0.5 * (low + high))[:2], low[2] + radius]), float(radius)))
+    return tuple(balls) if all(8 < ball.radius < 18 for ball in balls) else ()
+
+
 def scan_model(scan) -> Model:
-    """A user's scan: its own maps on its skin; eyes and teeth drawn without scattering; hair as surface; clear shells left out."""
-    kind = np.array(scan.part_kinds)[scan.parts]
-    kept = kind != "shell"
+    """A user's scan: its own maps on its skin; eyes and teeth drawn without scattering; hair as surface.
+
+    Left out: clear shells over the eyes, and cards of lashes and brows, which are nothing without their alpha. Eyes without a
+    texture are replaced by the default head's.
+    """
+    kinds = ["card" if kind == "hair" and ("lash" in name.lower() or "brow" in name.lower()) else kind
+             for name, kind in zip(scan.part_names, scan.part_kinds, strict=True)]
+    kind = np.array(kinds)[scan.parts]
+    eye_faces = scan.faces[kind == "eye"]
+    eye_points = scan.positions_mm[np.unique(eye_faces)].astype(float) if len(eye_faces) else None
+    balls = _own_eyes(eye_points) if eye_points is not None and scan.albedo is None else ()
+    kept = ~np.isin(kind, ["shell", "card", *(["eye"] if balls else [])])
     used, faces = np.unique(scan.faces[kept], return_inverse=True)
     faces = faces.reshape(-1, 3)
     positions, normals = scan.positions_mm[used].astype(float), scan.normals[used].astype(float)
@@ -94,9 +117,7 @@ def scan_model(scan) -> Model:
         proxy = _clustered(positions, normals, faces, albedo)
     else:
         proxy = Proxy(positions, normals, faces, albedo, sparse.identity(len(used), format="csr"))
-    eye_faces = faces[kind[kept] == "eye"]
     uvs = np.zeros((len(used), 2)) if scan.uvs is None else scan.uvs[used]
     surface = Skin(positions.astype(np.float32), normals.astype(np.float32), uvs.astype(np.float32), faces.astype(np.uint32),
                    np.zeros((len(used), len(MASKS)), dtype=np.float32), proxy, scan.albedo, scan.normal_map, scan.roughness, tuple(colour), scatters)
-    eyes_seen = positions[eye_faces.ravel()] if len(eye_faces) else None
-    return Model(surface, (), None, _scan_landmarks(positions, eyes_seen), procedural=False)
+    return Model(surface, tuple(eyes.eyeball(ball) for ball in balls), None, _scan_landmarks(positions, eye_points), procedural=False)

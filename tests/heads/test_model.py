@@ -95,6 +95,39 @@ def test_a_scan_renders(tmp_path):
     assert (result.samples > 0).mean() > 0.05 and result.image[result.samples > 0].mean() > 40
 
 
+def write_parts(file, parts):
+    """An OBJ of named groups (name, mesh)."""
+    lines, start = [], 1
+    for name, mesh in parts:
+        lines += [f"g {name}", *(f"v {x} {y} {z}" for x, y, z in mesh.vertices), *(f"f {a} {b} {c}" for a, b, c in mesh.faces + start)]
+        start += len(mesh.vertices)
+    file.write_text("\n".join(lines), encoding="utf-8")
+
+
+def test_an_uncoloured_scan_gets_eyes_and_loses_cards_and_shells(tmp_path):
+    import trimesh
+
+    from stimuli.heads.scan import read_scan
+
+    skull = trimesh.creation.icosphere(4, 0.5)
+    skull.apply_scale((160, 235, 200))
+    ball = trimesh.creation.icosphere(2, 12.0)
+    parts = [("Face", skull)]
+    for name, side in (("EyeLeft", 1), ("EyeRight", -1)):
+        moved = ball.copy()
+        moved.apply_translation((31.0 * side, 4.0, 88.0))
+        parts.append((name, moved))
+    shell = parts[1][1].copy()
+    shell.apply_scale(1.02)
+    parts += [("EyeOcclusion", shell), ("Eyelashes", shell.copy())]
+    write_parts(tmp_path / "head.obj", parts)
+    model = scan_model(read_scan(tmp_path / "head.obj", unit="mm"))
+    assert len(model.skin.positions) == len(skull.vertices)  # eyes replaced, shell and cards gone
+    assert [round(float(eye.centre[0])) for eye in model.eyes] == [31, -31]
+    assert all(abs(eye.radius - 12.3) < 0.2 for eye in model.eyes)
+    np.testing.assert_allclose(model.landmarks["eyes"], [0, 4, 88], atol=0.5)
+
+
 def test_a_large_scan_is_baked_on_a_cluster(monkeypatch, tmp_path):
     import trimesh
 
