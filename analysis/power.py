@@ -259,7 +259,7 @@ def fit_pilot(responses: Responses, most: int = 2_000) -> tuple[dict[str, dict[s
         if not _connected(counts.sum(axis=2)):
             raise InputError(f"the pilot at {framing!r} compares its techniques in separate groups; expected all to be connected")
         found = _ordered_probit(counts, most)
-        if found is None:
+        if found is None or not _strongly_connected(counts):
             raise InputError(
                 f"the pilot at {framing!r} has no finite worths: a technique was never or always preferred, or every answer is 0; "
                 "expected more people"
@@ -272,7 +272,7 @@ def fit_pilot(responses: Responses, most: int = 2_000) -> tuple[dict[str, dict[s
 
 
 def _ordered_probit(counts: np.ndarray, most: int) -> tuple[np.ndarray, float, float] | None:
-    """Worths (n,) centred, and the two cuts, in standard deviations; None where the likelihood has no maximum.
+    """Worths (n,) centred, and the two cuts, in standard deviations; None where nobody preferred anything.
 
     A kind of answer that nobody gave has its cut at the end of the scale: no 'no difference', slight = 0; no clear one, clear = 10.
     """
@@ -296,14 +296,19 @@ def _ordered_probit(counts: np.ndarray, most: int) -> tuple[np.ndarray, float, f
 
     start = np.r_[np.zeros(n), np.log([0.3, 0.9])]
     found = optimize.minimize(loss, start, method="BFGS", options={"maxiter": most, "gtol": 1e-3})
-    if np.abs(found.x[:n]).max() > 5:
-        return None
     return found.x[:n] - found.x[:n].mean(), *map(float, cuts(found.x))
 
 
 def _connected(met: np.ndarray) -> bool:
     links = (met + met.T) > 0
     reach = np.linalg.matrix_power(links.astype(float) + np.eye(len(met)), len(met))
+    return bool((reach > 0).all())
+
+
+def _strongly_connected(counts: np.ndarray) -> bool:
+    """Whether every technique is preferred, through others, to every other one, a tie counting both ways (Ford 1957)."""
+    won = counts[:, :, :3].sum(axis=2) + counts[:, :, 2:].sum(axis=2).T > 0
+    reach = np.linalg.matrix_power(won.astype(float) + np.eye(len(won)), len(won))
     return bool((reach > 0).all())
 
 
