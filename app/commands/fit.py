@@ -54,15 +54,15 @@ def command(kind, model, skin, terms, free, method, k, taps, reach, out, **mediu
     if reach is not None and not (np.isfinite(reach) and reach > 0):
         raise InputError(f"--reach is {reach:g}; expected more than 0 mm")
     report = {"fit": kind, "profile": name, "channels": {}}
-    click.echo(f"{kind} for {name}")
+    lines = [f"{kind} for {name}"]
     for c, channel in enumerate(CHANNELS):
         if kind == "gaussians":
             r = radius(c)
             found = gaussians.fit(r, of_channel(c)(r), terms, None if free else float(total[c]))
             found_report = {"variance_mm2": found.variance_mm2.tolist(), "weights": found.weights.tolist(), "error": found.error}
-            click.echo(f"{channel}: E = {100 * found.error:.3f} %, weights sum to {found.weights.sum():.5f}")
+            lines.append(f"{channel}: E = {100 * found.error:.3f} %, weights sum to {found.weights.sum():.5f}")
             for v, w in zip(found.variance_mm2, found.weights, strict=True):
-                click.echo(f"   v {v:.6g} mm^2  w {w:.6g}")
+                lines.append(f"   v {v:.6g} mm^2  w {w:.6g}")
         else:
             half = reach or far
             extra = {}
@@ -78,10 +78,11 @@ def command(kind, model, skin, terms, free, method, k, taps, reach, out, **mediu
             found_report = {"method": kernel.method, "offsets_mm": offsets.tolist(), "weights": weights.tolist(),
                             "energy_kept": kernel.total**2, "rms_error": kernel.rms_error, **extra}
             more = "".join(f", {key} {value:.4g}" for key, value in extra.items())
-            click.echo(f"{channel}: {kernel.method}, RMS error {100 * kernel.rms_error:.2f} %, keeps {100 * kernel.total**2:.2f} % of the energy{more}")
+            lines.append(f"{channel}: {kernel.method}, RMS error {100 * kernel.rms_error:.2f} %, keeps {100 * kernel.total**2:.2f} % of the energy{more}")
             for offset, weight in zip(offsets[taps // 2:], weights[taps // 2:], strict=True):
-                click.echo(f"   x {offset:8.4f} mm  w {weight:.6g}")
+                lines.append(f"   x {offset:8.4f} mm  w {weight:.6g}")
         report["channels"][channel] = found_report
+    click.echo("\n".join(lines))
     if out:
         out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
         click.echo(f"{out}: written")

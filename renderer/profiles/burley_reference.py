@@ -145,10 +145,10 @@ class Judged:
     error_fit: np.ndarray
 
 
-def judge(parametrisation: str, photons: int, seed: int = 0, albedos=ALBEDOS) -> Judged:
+def judge(parametrisation: str, photons: int, seed: int = 0, albedos=ALBEDOS, known: float = 0.05) -> Judged:
     """Compare R(r) of each albedo with Monte Carlo over RANGE.
 
-    The error is the mean of |R - R_MC| / R_MC over logarithmic bins that are known to 5 %; R is averaged over a bin by its
+    The error is the mean of |R - R_MC| / R_MC over logarithmic bins whose standard error is below `known`; R is averaged over a bin by its
     CDF, as photons are. The memo prints neither its radii nor their spacing, and both matter: docs/profiles.md.
     """
     from scipy.optimize import minimize_scalar
@@ -163,9 +163,9 @@ def judge(parametrisation: str, photons: int, seed: int = 0, albedos=ALBEDOS) ->
         alpha = chandrasekhar.albedo_of(A, diffuse)
         length = float(np.sqrt(grosjean_D(1 - alpha, alpha) / (1 - alpha))) if parametrisation == "dmfp" else 1.0
         edges, share, error = table.profile(alpha)
-        keep = (edges[:-1] >= RANGE[0]) & (edges[1:] <= RANGE[1]) & (error < 0.05 * share)
+        keep = (edges[:-1] >= RANGE[0]) & (edges[1:] <= RANGE[1]) & (error < known * share)
         if not keep.any():
-            raise InputError(f"{photons} photons leave no bin known to 5 % at an albedo of {A:g}; expected more")
+            raise InputError(f"{photons} photons leave no bin known to {100 * known:g} % at an albedo of {A:g}; expected more")
         low, high, share = edges[:-1][keep], edges[1:][keep], share[keep]
 
         def miss(log_s):

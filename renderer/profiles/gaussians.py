@@ -85,7 +85,7 @@ def fit(r_mm, target, terms: int, total: float | None) -> Fit:
 
     r_mm (N,): increasing, from near 0 to where the profile is spent; target (N,): R(r), 1/mm^2. d'Eon, Luebke and Enderton
     2007, "Efficient rendering of human skin", sec. 5: min int r (R - G)^2 dr over weights and variances. Starts are even
-    spreads and what non-negative least squares picks from a dense set of variances; each is refined by Levenberg and Marquardt
+    spreads and what non-negative least squares picks from a dense set of variances; each is refined by a trust region
     over log v and log w, and the best is returned.
     """
     from scipy.optimize import least_squares, nnls
@@ -105,7 +105,7 @@ def fit(r_mm, target, terms: int, total: float | None) -> Fit:
     low, high = np.log(np.interp([0.01, 0.98], mass / mass[-1], r) ** 2 / 2)  # log variances of the profile's own size
 
     def basis(log_v):
-        v = np.exp(np.clip(log_v, low - 12, high + 12))
+        v = np.exp(log_v)
         return root[:, None] * np.exp(-(r[:, None] ** 2) / (2 * v)) / (2 * np.pi * v) / scale
 
     def weights(log_w):
@@ -133,7 +133,9 @@ def fit(r_mm, target, terms: int, total: float | None) -> Fit:
     for start in starts:
         start = start + 1e-3 * np.arange(terms)
         first = np.log(np.maximum(project(start), 1e-3 * target.max() * np.exp(low)))
-        found = least_squares(residual, np.concatenate([start, first]), method="lm", max_nfev=4000, xtol=1e-12, ftol=1e-12)
+        # A term that the profile does not need would run away: variances stay near the profile's own.
+        bounds = np.repeat([low - 4, -60.0], terms), np.repeat([high + 3, 60.0], terms)
+        found = least_squares(residual, np.clip(np.concatenate([start, first]), *bounds), bounds=bounds, max_nfev=1000, xtol=1e-11, ftol=1e-11)
         if found.success and (best is None or found.cost < best.cost):
             best = found
     if best is None:

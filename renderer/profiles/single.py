@@ -12,7 +12,7 @@ from renderer.medium import Stack
 from renderer.profiles import fresnel
 from renderer.profiles.model import radii
 
-NODES = 400
+NODES = 200
 
 
 def _cosines(eta: float) -> tuple[np.ndarray, np.ndarray]:
@@ -30,7 +30,7 @@ def reflectance(stack: Stack, r_mm) -> np.ndarray:
     sine = np.sqrt(1 - mu**2)
     weight = w * (1 - fresnel.reflectance(mu, m.eta / stack.n_above)) * mu / sine
     depth = (1 + mu) / sine  # (z + d) / r
-    out = [np.exp(-s * r * depth) @ weight for s in m.sigma_t_prime]
+    out = [np.exp(np.maximum(-s * r * depth, -700.0)) @ weight for s in m.sigma_t_prime]  # below, exp is slow and nothing
     return np.stack(out, axis=-1) * np.array(m.sigma_s_prime) / (4 * np.pi * r)
 
 
