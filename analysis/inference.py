@@ -226,10 +226,9 @@ def familiarity_interaction(responses: Responses, options: Options) -> pd.DataFr
             continue
         y = net[here] / asked[here]
         ranks = _standard(stats.rankdata(y, axis=0))
-        order = np.argsort(rng.random((options.resamples, len(x))), axis=1)
-        turned = _standard(stats.rankdata(x))[order]  # (resamples, people)
-        rho = _standard(stats.rankdata(x)) @ ranks / len(x)
-        null = turned @ ranks / len(x)
+        levels = _standard(stats.rankdata(x))
+        rho = levels @ ranks / len(x)
+        null = np.stack([rng.permutation(levels) @ ranks for _ in range(options.resamples)]) / len(x)
         p = (1 + (np.abs(null) >= np.abs(rho) - 1e-9).sum(axis=0)) / (1 + options.resamples)
         together = (1 + ((null**2).sum(axis=1) >= (rho**2).sum() - 1e-9).sum()) / (1 + options.resamples)
         slope, low, high = _slopes(x, y, options)
