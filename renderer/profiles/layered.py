@@ -96,21 +96,29 @@ class Layered(Profile):
         return float(min(out))
 
     def _hankel(self, r_mm) -> tuple[np.ndarray, np.ndarray]:
-        """f(r) = (1 / 2 pi) int f(k) J0(k r) k dk, panels of Gauss and Legendre as narrow as J0 asks for."""
+        """f(r) = (1 / 2 pi) int f(k) J0(k r) k dk, radii of one octave at a time."""
         r = radii(r_mm)[:, 0]
+        out = np.empty((len(r), 2 * self.stack.channels))
+        octave = np.floor(np.log2(np.maximum(r / self._finest_mm(), 1)))
+        for each in np.unique(octave):
+            out[octave == each] = self._octave(r[octave == each])
+        return out[:, : self.stack.channels], out[:, self.stack.channels:]
+
+    def _octave(self, r: np.ndarray) -> np.ndarray:
+        """R and T side by side, (N, 2 C), by panels of Gauss and Legendre that J0 of the largest radius crosses in three periods."""
         k_max = 40 / self._finest_mm()
-        panels = int(np.clip(np.ceil(k_max * max(r.max(), 1e-9) / np.pi), 60, 20000))
+        panels = max(int(np.ceil(k_max * r.max() / (6 * np.pi))), 20)
         # Finer towards k = 0, where weak absorption bends the spectrum.
         edges = k_max * np.linspace(0, 1, panels + 1)
-        edges = np.unique(np.concatenate([edges, edges[1] * np.geomspace(1e-4, 1, 30)]))
-        t, w = np.polynomial.legendre.leggauss(8)
+        edges = np.unique(np.concatenate([edges, edges[1] * np.geomspace(1e-4, 1, 24)]))
+        t, w = np.polynomial.legendre.leggauss(24)
         half = 0.5 * np.diff(edges)
         k = (0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * t).ravel()
         w = (half[:, None] * w).ravel()
         faces = self.spectrum(k[:, None])
         both = np.concatenate([faces.R, np.broadcast_to(faces.T, faces.R.shape)], axis=1) * (w * k / (2 * np.pi))[:, None]
-        out = np.concatenate([j0(np.outer(part, k)) @ both for part in np.array_split(r, max(len(r) * len(k) // 4_000_000, 1)) if len(part)])
-        return out[:, : self.stack.channels], out[:, self.stack.channels:]
+        parts = np.array_split(r, max(len(r) * len(k) // 4_000_000, 1))
+        return np.concatenate([j0(np.outer(part, k)) @ both for part in parts if len(part)])
 
     def grid(self, size: int = FFT_SIZE, spacing_mm: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """R_d and T_d along a row of the FFT grid: radii (size / 4,) and (size / 4, C) each.
