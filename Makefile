@@ -2,15 +2,17 @@
 # make demo SERVE=0   the same, but end instead of serving
 # make test           install what is missing, run every test
 # make setup          install what is missing, nothing else
+# make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test demo clean
+.PHONY: help setup test demo bench clean
 
 SERVE ?= 1
 OUT ?= build/thesis
 PARTICIPANTS ?= 20
 SEED ?= 1
 PORT ?= 8000
+BENCH ?= $(sort $(basename $(notdir $(wildcard benchmarks/*.py))))
 SUBDERMAL = .venv/bin/subdermal
 
 help:
@@ -33,6 +35,9 @@ ifeq ($(SERVE),0)
 else
 	$(SUBDERMAL) serve $(OUT) --port $(PORT)
 endif
+
+bench: setup
+	@for name in $(BENCH); do printf '\n== %s\n' "$$name"; PYTHONPATH=. .venv/bin/python "benchmarks/$$name.py" || exit 1; done
 
 clean:
 	rm -rf build *.egg-info
