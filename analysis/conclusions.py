@@ -7,6 +7,7 @@ and said to be.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -15,9 +16,15 @@ import pandas as pd
 
 from .codebook import Codebook
 from .options import OVERALL, Options
-from .shown import MINUS, alpha_of, number, probability
+from .shown import alpha_of, number, probability
 from .worth_figures import framing_label, verdict
 
+SPOKEN = {
+    "bradley_terry": "Bradley and Terry's model",
+    "davidson": "Davidson's model",
+    "thurstone_jod": "Thurstone's case V",
+    "ordinal": "the ordinal model",
+}
 #: How many pairs one sentence names.
 MOST = 12
 
@@ -53,9 +60,7 @@ def conclude(
     _about_agreement(found, tables["agreement"], codebook, alpha, who.capitalize())
     _about_familiarity(found, tables["familiarity_interaction"], codebook, alpha)
     _about_exclusions(found, tables["participants"], tables["sensitivity"], people)
-    missing = [line for name in ("worths", "pairs") for line in notes.get(name, ()) if "no finite" in line]
-    for line in missing:
-        found.cannot.append(f"There is no fit: {_spoken(line, codebook)}.")
+    _about_fits(found, notes.get("worths", ()), codebook)
     found.cannot.append(
         "Nothing here says how people judge, since a program answered."
         if simulated
@@ -108,15 +113,20 @@ def _about_pairs(
             )
     untested = [row for row in rows.itertuples() if not np.isfinite(row.holm_p)]
     if untested:
-        found.cannot.append(f"{where}: too few answers to test {_pairs(untested, codebook)}.")
+        which = "any pair" if len(untested) == len(rows) else _pairs(untested, codebook)
+        found.cannot.append(f"{where}: too few people answered to test {which}.")
     undecided = [row for row in by["undecided"] if np.isfinite(row.holm_p)]
     if undecided:
-        all_of = "all " if len(undecided) == len(rows) and len(rows) > 1 else ""
-        tail = "neither a difference nor equality is shown" if options.margin or options.margin_jod else "no difference is shown, which does not make them equal"
-        found.cannot.append(
-            f"{where}: undecided {'is' if len(undecided) == 1 else 'are'} {all_of}{len(undecided)} of {len(rows)} pairs: {tail} for "
-            f"{_pairs(undecided, codebook)}."
-        )
+        tail = "neither a difference nor equality is shown"
+        if not options.margin and not options.margin_jod:
+            tail = "no difference is shown, which does not make them equal"
+        if len(undecided) == len(rows) > 1:
+            found.cannot.append(f"{where}: all {len(rows)} pairs are undecided: {tail} for any of them.")
+        else:
+            found.cannot.append(
+                f"{where}: {len(undecided)} of {count(len(rows), 'pair')} {'is' if len(undecided) == 1 else 'are'} undecided: {tail} for "
+                f"{_pairs(undecided, codebook)}."
+            )
 
 
 def _about_trend(found: Conclusions, trend: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
@@ -182,10 +192,15 @@ def _about_familiarity(found: Conclusions, table: pd.DataFrame, codebook: Codebo
 def _about_exclusions(found: Conclusions, participants: pd.DataFrame, sensitivity: pd.DataFrame, people: int) -> None:
     out = int(participants.excluded.fillna("").astype(str).ne("").sum())
     if not out:
-        found.can.append(f"The declared rules of exclusion fire for none of {count(people, 'participant')}: no conclusion hangs on them.")
+        found.can.append(f"The rules of exclusion fire for none of {count(people, 'participant')}: no conclusion hangs on them.")
+        return
+    if out == people or sensitivity.empty:
+        found.cannot.append(
+            f"The rules exclude {out} of {count(people, 'participant')}: those who are left are too few to compute the conclusions again."
+        )
         return
     changed = int(sensitivity.changed.fillna(False).astype(bool).sum())
-    words = f"Without the {count(out, 'participant')} whom the declared rules exclude, {changed} of {count(len(sensitivity), 'conclusion')}"
+    words = f"Without the {count(out, 'participant')} whom the rules exclude, {changed} of {count(len(sensitivity), 'conclusion')}"
     if changed:
         found.cannot.append(f"{words} would change; see the table of those.")
     else:
@@ -206,10 +221,19 @@ def _pairs(rows: list, codebook: Codebook) -> str:
     return "; ".join(names) + (f"; and {len(rows) - MOST} more" if len(rows) > MOST else "")
 
 
-def _spoken(line: str, codebook: Codebook) -> str:
-    """A note of the computation with the labels of framings."""
-    name, mark, rest = line.partition(", ")
-    return f"{framing_label(codebook, name)}{mark}{rest}".replace("-inf", f"{MINUS}inf").rstrip(".")
+def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) -> None:
+    """Fits that do not exist, from the notes 'FRAMING, MODEL: no finite worths: REASON', models of one reason together."""
+    models: dict[tuple[str, str], list[str]] = {}
+    for line in notes:
+        head, mark, reason = line.partition(": no finite worths: ")
+        framing, _, model = head.rpartition(", ")
+        if mark:
+            models.setdefault((framing, reason.rstrip(".")), []).append(SPOKEN.get(model, model))
+    labels = {name: codebook.label(name) for name in codebook.techniques}
+    words = re.compile("|".join(rf"(?<!\w){re.escape(name)}(?!\w)" for name in sorted(labels, key=len, reverse=True)))
+    for (framing, reason), names in models.items():
+        spoken = words.sub(lambda found: labels[found[0]], reason)
+        found.cannot.append(f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: {spoken}.")
 
 
 def listed(names: list[str]) -> str:

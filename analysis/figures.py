@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import textwrap
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -86,8 +87,12 @@ class Picture:
 def _picture(
     name: str, title: str, caption: str, alt: str, draw: Callable[..., Figure], *args: object, simulated: bool = False
 ) -> Picture:
-    """Draw with our style and save; nothing global changes."""
-    with matplotlib.rc_context({**matplotlib.rcParamsDefault, "backend": "agg", **RC}):
+    """Draw with our style and save; nothing global changes. Letters that the font lacks are said in the caption."""
+    with (
+        matplotlib.rc_context({**matplotlib.rcParamsDefault, "backend": "agg", **RC}),
+        warnings.catch_warnings(record=True) as warned,
+    ):
+        warnings.simplefilter("always")
         figure = draw(*args)
         if simulated:
             _mark(figure)
@@ -100,6 +105,12 @@ def _picture(
         FigureCanvasAgg(figure).print_png(png, metadata={"Title": about})
         FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Title": about})
         FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None, "Title": about})
+    lacking = [one for one in warned if "missing from" in str(one.message)]
+    if lacking:
+        caption += " Some letters of its names are not in the figure's font and show as boxes; the tables have them."
+    for one in warned:
+        if one not in lacking:
+            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
     alt = f"{SIMULATED}. {alt}" if simulated else alt
     return Picture(name, title, caption, alt, svg.getvalue(), png.getvalue(), pdf.getvalue())
 

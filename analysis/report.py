@@ -379,8 +379,8 @@ def _summary(
         else f"{a} and {b} were never compared."
     )
     sentences.append(
-        f"Over all answers the image on the left was preferred {sides.left.sum()} times, the one on the right "
-        f"{sides.right.sum()} times; no difference was seen {sides.none.sum()} times."
+        f"Over all answers the image on the left was preferred {_count(sides.left.sum(), 'time')}, the one on the right "
+        f"{_count(sides.right.sum(), 'time')}; no difference was seen {_count(sides.none.sum(), 'time')}."
     )
     return sentences
 
