@@ -34,8 +34,11 @@ from .responses import Responses
 
 #: Standard deviation of a difference in JOD: Phi(1 / JOD_SIGMA) = 0.75.
 JOD_SIGMA = 1 / stats.norm.ppf(0.75)
-#: Newton's method stops at steps below the first, and gives up after so many or where a worth passes the last (logits, probits).
-STEP, ITERATIONS, FARTHEST = 1e-9, 60, 40.0
+#: Newton's method stops at steps below the first, and gives up after so many or where a worth passes the last (logits, probits);
+#: a slope at the last is still far above rounding, so that no flight to infinity is taken for an end.
+STEP, ITERATIONS, FARTHEST = 1e-9, 60, 20.0
+#: Added to the diagonal of an information, as a share of its mean, so that one that runs flat can be solved.
+RIDGE = 1e-11
 
 #: The ordinal model has no random effects where nobody gave more answers than the first, and a note of bias up to the second.
 NO_TASTE, FEW_ANSWERS = 2, 6
@@ -186,8 +189,8 @@ def _newton(x: np.ndarray, data: tuple[np.ndarray, ...], derivatives: Callable) 
         slope, curvature = derivatives(w[active] @ x.T, *(one[active] for one in data))
         information = (curvature @ outer).reshape(-1, n, n)
         # The information is blind to a common shift: a constant matrix fills that direction and leaves the rest.
-        information += information[:, range(n), range(n)].mean(axis=1)[:, None, None] / n + np.finfo(float).tiny
-        step = np.linalg.solve(information, (slope @ x)[..., None])[..., 0]
+        information += information[:, range(n), range(n)].mean(axis=1)[:, None, None] / n
+        step = _solved(information, slope @ x)
         length = np.abs(step).max(axis=1)
         w[active] += step * np.minimum(1, 2 / np.maximum(length, 1e-300))[:, None]
         astray = ~(np.abs(w[active]).max(axis=1) < FARTHEST)
@@ -197,6 +200,13 @@ def _newton(x: np.ndarray, data: tuple[np.ndarray, ...], derivatives: Callable) 
             break
     w[active] = np.nan
     return w - w.mean(axis=1, keepdims=True)
+
+
+def _solved(information: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """Newton steps (R, n) for informations (R, n, n) and slopes (R, n)."""
+    size = range(slope.shape[1])
+    information[:, size, size] += RIDGE * information[:, size, size].mean(axis=1, keepdims=True) + np.finfo(float).tiny
+    return np.linalg.solve(information, slope[..., None])[..., 0]
 
 
 def davidson(wins: np.ndarray, ties: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -237,10 +247,10 @@ def _davidson(x: np.ndarray, over: np.ndarray, under: np.ndarray, level: np.ndar
         slope[:, n] = (level[active] - m * draw).sum(axis=1)
         information = np.empty((len(t), n + 1, n + 1))
         information[:, :n, :n] = ((m * ((1 - draw) / 4 - lean**2)) @ outer).reshape(-1, n, n)
-        information[:, :n, :n] += information[:, range(n), range(n)].mean(axis=1)[:, None, None] / n + np.finfo(float).tiny
+        information[:, :n, :n] += information[:, range(n), range(n)].mean(axis=1)[:, None, None] / n
         information[:, :n, n] = information[:, n, :n] = -(m * lean * draw) @ x
-        information[:, n, n] = (m * draw * (1 - draw)).sum(axis=1) + np.finfo(float).tiny
-        step = np.linalg.solve(information, slope[..., None])[..., 0]
+        information[:, n, n] = (m * draw * (1 - draw)).sum(axis=1)
+        step = _solved(information, slope)
         length = np.abs(step).max(axis=1)
         theta[active] += step * np.minimum(1, 2 / np.maximum(length, 1e-300))[:, None]
         astray = ~(np.abs(theta[active]).max(axis=1) < FARTHEST)
