@@ -106,6 +106,12 @@ def resolve(study: Study) -> dict[str, Any]:
     return resolved
 
 
+def samples_per_pixel(samples: np.ndarray) -> float:
+    """The mean of an image's counts of samples where any was taken; 0 where nothing was sampled."""
+    taken = samples[samples > 0]
+    return round(float(taken.mean()), 4) if taken.size else 0.0
+
+
 def commit() -> str | None:
     """The git commit of the checkout that this package runs from, with "-dirty" where tracked source
     that shapes the images differs from it; None where there is no checkout or no git."""
@@ -181,8 +187,8 @@ def _render(
                 frame = drawing.frame(framing)
                 for stimulus in (s for s in todo if s.framing == framing):
                     bar.set_postfix_str(f"{framing}, {stimulus.condition}")
-                    pixels = frame.render(stimulus.parameters).image
-                    digest = _write_png(out / stimulus.file, pixels, study.render.size)
+                    result = frame.render(stimulus.parameters)
+                    digest = _write_png(out / stimulus.file, result.image, study.render.size)
                     image = {
                         "framing": framing,
                         "technique": stimulus.condition,
@@ -196,6 +202,7 @@ def _render(
                             **_jsonable(stimulus.parameters),
                         },
                         "seed": study.render.seed,
+                        "measures": {"samples_per_pixel": samples_per_pixel(result.samples)},
                         **entry,
                     }
                     state[stimulus.file] = {"key": stimulus.key, "image": image}

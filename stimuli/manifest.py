@@ -6,6 +6,7 @@ TOML file, `images` with `framing`, `technique`, `file`, `width`, `height`, `sha
 
 import hashlib
 import json
+import math
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -15,12 +16,17 @@ from stimuli.table import Table
 
 NAME = "manifest.json"
 FORMAT = "subdermal-manifest/1"
+#: What `analyse` sets beside worth: samples a pixel where light is scattered, milliseconds an image, and distances to the reference.
+MEASURES = ("samples_per_pixel", "milliseconds", "dssim", "flip")
 _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
 
 
 @dataclass(frozen=True)
 class Image:
-    """An image of the study. `renderer` and `head` are None where it was made elsewhere."""
+    """An image of the study. `renderer` and `head` are None where it was made elsewhere.
+
+    measures: what it cost and how far it is from the reference, where that is known: see `MEASURES`.
+    """
 
     framing: str
     technique: str
@@ -33,6 +39,7 @@ class Image:
     seed: int | None = None
     renderer: dict | None = None
     head: dict | None = None
+    measures: dict = field(default_factory=dict)
 
     @property
     def media_type(self) -> str:
@@ -117,9 +124,17 @@ def _image(entry: Table, study: Study, directory: Path) -> Image:
         seed=entry.take("seed", int, default=None),
         renderer=entry.take("renderer", dict, default=None),
         head=entry.take("head", dict, default=None),
+        measures=_measures(entry.table("measures", default={})),
     )
     entry.end()
     return image
+
+
+def _measures(table: Table) -> dict:
+    for key in MEASURES:
+        table.take(key, (int, float), "a number from 0", lambda value: not isinstance(value, bool) and 0 <= value < math.inf, default=0)
+    table.end()
+    return table.value
 
 
 def _is_sha256(text: str) -> bool:

@@ -40,6 +40,7 @@ def test_manifest_tells_how_each_image_was_made(small_study, fake_renderer, out)
     assert image.sha256 == sha256(image.path) and PIL.Image.open(image.path).size == (32, 18)
     assert image.parameters == {"technique": "blur", "supersample": 1, "radius_mm": 2.5}
     assert image.seed == 5
+    assert image.measures == {"samples_per_pixel": 6.5}  # of 4 and 9; nothing is scattered where there are 0
     assert image.renderer == {"version": "1", "gl_vendor": "fake", "commit": stimuli.build.commit()}
     assert image.head == {"source": "a sphere"}
     assert manifest.licences[0]["licence"] == "CC0-1.0"

@@ -57,6 +57,8 @@ def test_own_question_and_scale_are_kept(change):
         (lambda m: m["study"].update(render={}), r"study\.render: unknown key"),
         (lambda m: m["study"]["techniques"][0].update(label=""), r"study\.techniques\[0\]\.label: got ''"),
         (lambda m: m.update(images=[]), r"images: got \[\], expected a list of at least 1 tables"),
+        (lambda m: m["images"][0].update(measures={"ms": 1}), r"images\[0\]\.measures\.ms: unknown key"),
+        (lambda m: m["images"][0].update(measures={"dssim": -1}), r"images\[0\]\.measures\.dssim: got -1, expected a number from 0"),
         (lambda m: m["images"].pop(), r"images: none of blender at far"),
         (lambda m: m["images"].append(dict(m["images"][0], file="x.png")), r"images\[4\]: a second image of unreal at near"),
         (lambda m: m["images"][1].update(file="near-unreal.png"), r"images\[1\]\.file: .* differs from that of images\[0\]"),
