@@ -11,16 +11,20 @@ layout(location = 1) out vec4 count;
 struct Pixel { vec3 irradiance; float depth; vec2 at; vec2 size; float scale; mat2 turn; };
 struct Sum { vec3 weight; vec3 light; };
 
-Pixel centre_pixel(vec4 centre) {
-    Pixel p;
+// Sets up the pixel and the outputs as without scattering; false where it stays so: no skin, or a filter narrower than a pixel.
+bool begin(out Pixel p) {
+    vec4 centre = texelFetch(irradiance, ivec2(gl_FragCoord.xy), 0);
+    bool skin = centre.a >= 0.5;
+    scattered = vec4(centre.rgb, skin ? 1.0 : 0.0);
+    count = vec4(skin ? 1.0 : 0.0, 0.0, 0.0, 1.0);
     p.irradiance = centre.rgb;
     p.depth = texelFetch(depth_normal, ivec2(gl_FragCoord.xy), 0).x;
     p.at = gl_FragCoord.xy;
     p.size = vec2(textureSize(irradiance, 0));
-    p.scale = pixels_per_mm / p.depth;
+    p.scale = pixels_per_mm / max(p.depth, 1e-3);
     float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
     p.turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
-    return p;
+    return skin && filter_radius_mm * p.scale >= 1.0;
 }
 
 // Adds sample k; returns its irradiance and whether it lies on scattering material.

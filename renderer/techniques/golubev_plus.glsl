@@ -5,14 +5,8 @@ uniform float inner_mm;
 uniform int base;  // no constant, so that neither loop is unrolled: software drivers run unrolled code for pixels without skin too
 
 void main() {
-    vec4 centre = texelFetch(irradiance, ivec2(gl_FragCoord.xy), 0);
-    scattered = vec4(centre.rgb, 0.0);
-    count = vec4(0.0, 0.0, 0.0, 1.0);
-    if (centre.a < 0.5) return;
-    Pixel p = centre_pixel(centre);
-    scattered = vec4(centre.rgb, 1.0);
-    count.x = 1.0;
-    if (filter_radius_mm * p.scale < 1.0) return;
+    Pixel p;
+    if (!begin(p)) return;
     Sum sum = Sum(vec3(0.0), vec3(0.0));
     vec4 inner = vec4(0.0), outer = vec4(0.0);
     for (int k = 0; k < base; ++k) {
