@@ -10,6 +10,9 @@ sqrt((n - 1)/n) and takes a normal quantile where Student's is due, so the tail 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import lru_cache
+
 import numpy as np
 import pandas as pd
 from scipy import stats
@@ -20,8 +23,8 @@ from .responses import Responses
 
 #: An interval is given where at least this share of the resamples has an estimate.
 LEAST_SHARE = 0.95
-#: Weights that are held at once, numbers: 64 MiB in float32.
-CHUNK = 1 << 24
+#: Weights that are computed on at once, numbers: 16 MiB in float32; and those that are kept for the next statistic: 96 MiB.
+CHUNK, KEPT = 1 << 22, 48 << 20
 
 
 def weights(people: int, resamples: int, seed: int) -> np.ndarray:
@@ -29,14 +32,28 @@ def weights(people: int, resamples: int, seed: int) -> np.ndarray:
     return np.concatenate(list(_chunks(people, resamples, seed)))
 
 
-def _chunks(people: int, resamples: int, seed: int):
+def _chunks(people: int, resamples: int, seed: int) -> Iterator[np.ndarray]:
+    """`weights` in parts, so that memory stays flat; what fits is drawn once for all statistics of a report."""
+    if people * resamples <= KEPT:
+        parts = _kept(people, resamples, seed)
+    else:
+        parts = _drawn(people, resamples, seed)
+    return (part.astype(np.float32) for part in parts)
+
+
+@lru_cache(maxsize=2)
+def _kept(people: int, resamples: int, seed: int) -> tuple[np.ndarray, ...]:
+    return tuple(part.astype(np.uint16) for part in _drawn(people, resamples, seed))
+
+
+def _drawn(people: int, resamples: int, seed: int) -> Iterator[np.ndarray]:
     rng = np.random.default_rng([seed, people])
     step = max(1, CHUNK // max(people, 1))
     for start in range(0, resamples, step):
         rows = min(step, resamples - start)
         drawn = rng.integers(0, people, (rows, people), dtype=np.int32)
         drawn += np.arange(rows, dtype=np.int32)[:, None] * people
-        yield np.bincount(drawn.ravel(), minlength=rows * people).reshape(rows, people).astype(np.float32)
+        yield np.bincount(drawn.ravel(), minlength=rows * people).reshape(rows, people)
 
 
 def totals(values: np.ndarray, options: Options) -> np.ndarray:
