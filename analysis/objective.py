@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy import ndimage, stats
 
 from .codebook import Codebook
+from .conclusions import listed
 from .errors import InputError
 
 #: Measure -> what it is called, with its unit. Less of each is better or cheaper.
@@ -58,24 +59,27 @@ def read_measures(path: str | Path, reference: str = REFERENCE) -> Measured:
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < float("inf"):
                 raise InputError(f"{path}: images[{place}].measures.{name} is {value!r:.60}, expected a number from 0")
             rows.append((image.get("framing"), image.get("technique"), name, float(value), "manifest"))
-    held = {name for _, _, name, _, _ in rows}
+    held = sorted({name for _, _, name, _, _ in rows})
     if "dssim" not in held:
         found, why = _dssim(path.parent, images, reference)
         rows += found
         notes += why
+    for name in held:
+        missing = len(images) - sum(row[2] == name for row in rows)
+        if missing:
+            notes.append(f"{missing} of {len(images)} images in the manifest have no {MEASURES[name]}.")
     absent = [MEASURES[name] for name in MEASURES if name not in {row[2] for row in rows} and name != "dssim"]
     if absent:
-        notes.append(f"The manifest holds no {' and no '.join(absent)}; nothing is said of them.")
+        notes.append(f"The manifest holds no {' and no '.join(absent)}; nothing is said of that.")
     return Measured(pd.DataFrame(rows, columns=["framing", "technique", "measure", "value", "source"]), tuple(notes))
 
 
 def _dssim(folder: Path, images: list[dict], reference: str) -> tuple[list[tuple], list[str]]:
-    """(1 - SSIM)/2 of every image to the reference of its framing, on luminance (Wang et al. 2004, doi:10.1109/TIP.2003.819861)."""
+    """`dssim` of every image to the reference of its framing, on luminance."""
     references = {image.get("framing"): image for image in images if image.get("technique") == reference}
     if not references:
         return [], [f"No condition is called {reference!r}, so that no image is compared to a reference."]
     from PIL import Image
-    from skimage.metrics import structural_similarity
 
     def luminance(image: dict) -> np.ndarray:
         file = image.get("file")
@@ -96,9 +100,28 @@ def _dssim(folder: Path, images: list[dict], reference: str) -> tuple[list[tuple
                 if other.shape != against.shape:
                     notes.append(f"{image.get('technique')} at {framing} differs in size from the reference and is not compared.")
                     continue
-                similarity = structural_similarity(against, other, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False)
-                rows.append((framing, image.get("technique"), "dssim", (1 - similarity) / 2, "images"))
+                rows.append((framing, image.get("technique"), "dssim", dssim(against, other), "images"))
     return rows, notes
+
+
+def dssim(x: np.ndarray, y: np.ndarray) -> float:
+    """(1 - SSIM)/2 of two images (H, W) in [0, 1]: 0 for the same one, at most 1.
+
+    Mean SSIM in an 11 x 11 Gaussian window of 1.5 pixels with K1 = 0.01 and K2 = 0.03, where the window lies inside the image (Wang et al.
+    2004, "Image quality assessment: from error visibility to structural similarity", doi:10.1109/TIP.2003.819861, eq. 13).
+    """
+
+    def blurred(image: np.ndarray) -> np.ndarray:
+        return ndimage.gaussian_filter(image, 1.5, radius=5)[5:-5, 5:-5]
+
+    if min(x.shape) < 11:
+        raise InputError(f"an image of {x.shape[1]} x {x.shape[0]} pixels is too small for DSSIM, expected 11 x 11 or more")
+    c1, c2 = 0.01**2, 0.03**2
+    mean_x, mean_y = blurred(x), blurred(y)
+    variance_x, variance_y = blurred(x * x) - mean_x**2, blurred(y * y) - mean_y**2
+    covariance = blurred(x * y) - mean_x * mean_y
+    ssim = (2 * mean_x * mean_y + c1) * (2 * covariance + c2) / ((mean_x**2 + mean_y**2 + c1) * (variance_x + variance_y + c2))
+    return float((1 - ssim.mean()) / 2)
 
 
 def against_worth(measured: pd.DataFrame, worths: pd.DataFrame, model: str = "thurstone_jod") -> pd.DataFrame:
@@ -146,8 +169,8 @@ def sentences(table: pd.DataFrame, correlated: pd.DataFrame, notes: tuple[str, .
     for row in correlated.itertuples():
         here = table[(table.framing == row.framing) & (table.measure == row.measure)]
         where, what = codebook.framing_label(row.framing), MEASURES[row.measure]
-        front = ", ".join(codebook.label(one.technique) for one in here[here.front].sort_values("value").itertuples())
-        words = f"{where}: for {what}, nothing beats {front}"
+        front = [codebook.label(one.technique) for one in here[here.front].sort_values("value").itertuples()]
+        words = f"{where}, {what} against worth: no other technique beats {listed(front)} in both"
         if np.isfinite(row.spearman):
             shown = f"{row.spearman:+z.2f}".replace("-", "\N{MINUS SIGN}")
             words += f"; rank correlation with worth {shown} over {row.n} techniques (p = {row.p:.2f})"

@@ -411,6 +411,9 @@ def draw_objective(table: pd.DataFrame, measure: str, about: str, codebook: Code
 def _objective(table: pd.DataFrame, about: str, codebook: Codebook) -> Figure:
     framings = list(dict.fromkeys(table.framing))
     figure, panels = figures._panels(len(framings), 3, 2.3, below_in=0.2, sharey=True)
+    room = max(float(table.value.max()), 1e-12)
+    ends = table[["low", "high", "estimate"]].to_numpy()
+    tall, end = max(float(np.nanmax(ends) - np.nanmin(ends)), 0.1), 1.12 * room
     for ax, framing in zip(panels, framings, strict=True):
         here = table[table.framing == framing].sort_values("value")
         front = here[here.front]
@@ -421,21 +424,14 @@ def _objective(table: pd.DataFrame, about: str, codebook: Codebook) -> Figure:
             ax.plot(row.value, row.estimate, "o", color=BLUE, markersize=4.5)
             if row.front:
                 ax.plot(row.value, row.estimate, "o", markerfacecolor="none", markeredgecolor=ORANGE, markersize=9)
-        room = max(float(table.value.max() - min(table.value.min(), 0)), 1e-12)
-        for row in here.itertuples():
-            right = row.value > 0.6 * room
-            ax.annotate(
-                figures._cut(codebook.label(row.technique), 14),
-                (row.value, row.estimate),
-                xytext=(-6 if right else 6, 3),
-                textcoords="offset points",
-                ha="right" if right else "left",
-                size=7,
-            )
+        labelled = here.sort_values("estimate")
+        for row, y in zip(labelled.itertuples(), _apart(labelled.estimate.to_numpy(), 0.085 * tall), strict=True):
+            ax.plot([row.value, end], [row.estimate, y], color="#999999", linewidth=0.5, zorder=0)
+            ax.text(end + 0.02 * room, y, figures._cut(codebook.label(row.technique), 14), va="center_baseline", size=7)
         ax.axhline(0, color="#888888", linewidth=0.7, zorder=0)
         ax.set_title(figures._cut(framing_label(codebook, framing), 24), loc="left")
-        ax.set_xlim(left=0 if table.value.min() >= 0 else None, right=float(table.value.max()) + 0.08 * room)
-        ax.xaxis.set_major_locator(MaxNLocator(4))
+        ax.set_xlim(-0.04 * room, 1.62 * room)
+        ax.set_xticks([tick for tick in MaxNLocator(4).tick_values(0, room) if tick <= 1.05 * room])
         ax.tick_params(labelleft=True)
         ax.grid()
     figure.supxlabel(about, size=8)
