@@ -1,0 +1,143 @@
+"""The sentences of the report, against hand-made tables: each number comes from its cell, and nothing more is claimed."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.codebook import Codebook
+from analysis.conclusions import conclude
+from analysis.inference import PAIRS
+from analysis.options import Options
+from analysis.worth_figures import verdict
+
+BOOK = Codebook(("close-up",), ("a", "b", "c"), "", "", {("technique", "a"): "Ay", ("framing", "close-up"): "Close-up"})
+EQUAL = {"equivalent": 1.0, "tost_p": 0.001, "tost_holm_p": 0.01, "equivalence_low": -0.1, "equivalence_high": 0.12}
+
+
+def pair(a, b, **changes):
+    row = dict.fromkeys(PAIRS, 0.0) | {"framing": "close-up", "a": a, "b": b, "n": 20, "mean_preference": 0.05}
+    row |= {"holm_p": 0.5, "tost_p": 0.4, "tost_holm_p": 0.9, "equivalent": 0.0, "jod_equivalent": np.nan}
+    return row | changes
+
+
+def tables(*pairs, **changes):
+    found = {
+        "pairs": pd.DataFrame(pairs, columns=[*PAIRS]),
+        "trend": pd.DataFrame([], columns=["statistic", "value", "low", "high", "p"]),
+        "agreement": pd.DataFrame([], columns=["framing", "statistic", "value", "low", "high", "p"]),
+        "familiarity_interaction": pd.DataFrame([], columns=["framing", "technique", "slope", "holm_p", "detectable"]),
+        "participants": pd.DataFrame({"excluded": ["", ""]}),
+        "sensitivity": pd.DataFrame({"changed": [0, 0]}),
+    }
+    return found | changes
+
+
+def said(found, options=Options(margin=0.25), notes=(), simulated=False, people=20):
+    result = conclude(found, {"worths": tuple(notes)}, BOOK, options, people, simulated)
+    return " | ".join(result.can), " | ".join(result.cannot)
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"holm_p": 0.05}, "different"),
+        ({"holm_p": 0.0501}, "undecided"),
+        (EQUAL, "equivalent"),
+        (EQUAL | {"tost_holm_p": 0.06}, "undecided"),
+        (EQUAL | {"equivalent": 0.0}, "undecided"),
+        (EQUAL | {"holm_p": 0.01}, "both"),
+        ({"equivalent": np.nan, "jod_equivalent": 1.0}, "equivalent"),
+        ({"equivalent": np.nan, "jod_equivalent": np.nan, "holm_p": np.nan}, "undecided"),
+    ],
+)
+def test_what_a_pair_comes_to(changes, expected):
+    row = next(pd.DataFrame([pair("a", "b", **changes)]).itertuples())
+    assert verdict(row, 0.05) == expected
+
+
+def test_differences_name_winner_loser_and_the_largest_p():
+    can, cannot = said(
+        tables(
+            pair("a", "b", holm_p=0.031, mean_preference=-0.7),
+            pair("a", "c", holm_p=0.0004, mean_preference=-0.9),
+            pair("b", "c", mean_preference=0.3),
+        )
+    )
+    assert "Close-up: people preferred Ay over b and c (Wilcoxon's signed-rank test, p at most 0.031 after Holm's correction; 2 of 3 pairs)." in can
+    assert "Close-up: 1 of 3 pairs is undecided: neither a difference nor equality is shown for b and c." in cannot
+    assert "as good as each other" not in can
+
+
+def test_a_preference_for_the_second_turns_the_sentence():
+    can, _ = said(tables(pair("a", "b", holm_p=0.0001, mean_preference=0.7)), Options(margin=0.25, test="sign"))
+    assert "people preferred b over Ay (sign test, p <0.001 after Holm's correction; 1 of 1 pairs)" in can
+
+
+def test_equality_is_claimed_after_correction_only_and_with_its_interval():
+    can, _ = said(tables(pair("a", "b", **EQUAL)))
+    assert (
+        "Close-up: Ay and b are as good as each other within the declared margin of 0.25 points: the mean preference for b is +0.05, "
+        "interval \N{MINUS SIGN}0.10 to +0.12 (two one-sided tests, p = 0.010 after Holm's correction)." in can
+    )
+    can, cannot = said(tables(pair("a", "b", **EQUAL | {"tost_holm_p": 0.3})))
+    assert "as good" not in can and "when taken alone (two one-sided tests, p = 0.001)" in cannot and "(p = 0.30)" in cannot
+
+
+def test_without_a_margin_nothing_is_equal_and_that_is_said():
+    can, cannot = said(tables(pair("a", "b", equivalent=np.nan)), Options())
+    assert "as good" not in can
+    assert "No margin of equivalence was declared" in cannot and "which does not make them equal" in cannot
+
+
+def test_too_few_people_are_not_called_undecided():
+    _, cannot = said(tables(pair("a", "b", holm_p=np.nan), pair("a", "c", holm_p=np.nan)))
+    assert "too few people answered to test any pair" in cannot and "undecided" not in cannot
+
+
+@pytest.mark.parametrize(("p", "where"), [(0.01, 0), (0.2, 1), (np.nan, 1)])
+def test_the_trend_is_concluded_with_its_p_only(p, where):
+    trend = pd.DataFrame([("slope_strength", -0.3, -0.4, -0.2, p)], columns=["statistic", "value", "low", "high", "p"])
+    both = said(tables(pair("a", "b"), trend=trend))
+    words = "change by \N{MINUS SIGN}0.300 a framing"
+    assert words in both[where] and words not in both[1 - where]
+    assert ("get weaker" in both[0]) == (where == 0)
+
+
+def test_familiarity_names_what_would_have_been_found():
+    columns = ["framing", "technique", "slope", "holm_p", "detectable"]
+    none = pd.DataFrame([("close-up", "a", 0.1, 0.9, 0.6)], columns=columns)
+    _, cannot = said(tables(pair("a", "b"), familiarity_interaction=none))
+    assert "only a correlation of 0.60 or more would be found four times in five" in cannot
+    hit = pd.DataFrame([("close-up", "a", 0.1, 0.02, 0.6)], columns=columns)
+    can, _ = said(tables(pair("a", "b"), familiarity_interaction=hit))
+    assert "changes the preference for Ay at Close-up (+0.10 points a level, p = 0.020)" in can
+
+
+@pytest.mark.parametrize(
+    ("excluded", "changed", "where", "words"),
+    [
+        (["", ""], [0, 0], 0, "fire for none of 2 participants"),
+        (["x", ""], [0, 0], 0, "Without the 1 participant whom the rules exclude, 0 of 2 conclusions would change"),
+        (["x", ""], [1, 0], 1, "1 of 2 conclusions would change; see the table"),
+        (["x", "x"], [], 1, "those who are left are too few"),
+    ],
+)
+def test_exclusions_say_what_hangs_on_them(excluded, changed, where, words):
+    found = tables(
+        pair("a", "b"),
+        participants=pd.DataFrame({"excluded": excluded}),
+        sensitivity=pd.DataFrame({"changed": np.array(changed, int)}),
+    )
+    assert words in said(found, people=2)[where]
+
+
+def test_fits_that_do_not_exist_are_named_once_with_labels():
+    notes = [f"close-up, {model}: no finite worths: a was never beaten by b" for model in ("bradley_terry", "thurstone_jod")]
+    _, cannot = said(tables(pair("a", "b")), notes=[*notes, "close-up, davidson: 3 resamples have no finite worths"])
+    assert "Close-up: there are no worths by Bradley and Terry's model and Thurstone's case V: Ay was never beaten by b." in cannot
+    assert "Davidson" not in cannot
+
+
+def test_simulated_answers_say_nothing_of_people():
+    can, cannot = said(tables(pair("a", "b", holm_p=0.001, mean_preference=-1)), simulated=True)
+    assert "simulated participants preferred" in can and "people" not in can and "since a program answered" in cannot
