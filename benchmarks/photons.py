@@ -130,20 +130,21 @@ def speed() -> None:
     with tempfile.TemporaryDirectory() as folder:
         name, plain = yardstick(Path(folder))
         print(f"yardstick: {name}; {ROUNDS} rounds in turn, medians; million photons a second on one thread, then on {cores}")
-        print(f"{'case':<38}{'plain CPU':>10}{'ours CPU':>10}{'ratio':>7}{'plain wall':>12}{'ours wall':>11}{f'{cores} threads':>11}{'scaling':>9}  off")
+        print(f"wall x: how much faster all threads are; CPU x: what more they cost (1: nothing is lost, so idle cores scale); load {os.getloadavg()[0]:.1f}")
+        print(f"{'case':<38}{'plain CPU':>10}{'ours CPU':>10}{'ratio':>7}{'plain wall':>12}{'ours wall':>11}{f'{cores} threads':>11}{'wall x':>8}{'CPU x':>7}  off")
         for case, (photons, layers) in CASES.items():
             rows, shares = [], []
             for round_ in range(ROUNDS):
                 wall, cpu, R, T = plain(photons, round_, layers)
                 one = ours(photons, round_, layers, 1)
                 many = ours(photons, round_, layers, cores)
-                rows.append((cpu, one[1], wall, one[0], many[0]))
+                rows.append((cpu, one[1], wall, one[0], many[0], many[1]))
                 shares.append((R - one[2].diffuse_reflectance - (one[2].specular - _first(layers)), one[2].diffuse_reflectance_error))
             # The yardstick has about our error; the mean of all rounds must agree.
             off = np.mean([d for d, _ in shares]) / (np.sqrt(2 / ROUNDS) * np.mean([e for _, e in shares]))
-            plain_cpu, our_cpu, plain_wall, our_wall, all_wall = photons / 1e6 / np.median(np.array(rows), axis=0)
+            plain_cpu, our_cpu, plain_wall, our_wall, all_wall, all_cpu = photons / 1e6 / np.median(np.array(rows), axis=0)
             print(f"{case:<38}{plain_cpu:>10.3f}{our_cpu:>10.3f}{our_cpu / plain_cpu:>7.2f}{plain_wall:>12.3f}{our_wall:>11.3f}{all_wall:>11.3f}"
-                  f"{all_wall / our_wall:>9.2f}  {off:+.1f} sigma", flush=True)
+                  f"{all_wall / our_wall:>8.2f}{our_cpu / all_cpu:>7.2f}  {off:+.1f} sigma", flush=True)
             if abs(off) > 4:
                 sys.exit(f"photons: {case}: the yardstick and ours disagree by {off:.1f} standard errors")
 

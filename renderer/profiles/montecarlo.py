@@ -313,6 +313,14 @@ def simulate(
     return Result(setting, photons, run.tally)
 
 
+def half_space(alpha: float, photons: int, seed: int = 0, illumination: str = "searchlight", bins: int | Sequence[float] = BINS, **rest) -> Result:
+    """Burley's setting: isotropic scatterers of single-scattering albedo alpha, no boundary, sigma_t = 1/mm, so that mm are mean free paths.
+
+    illumination "diffuse" is his diffuse transmission: light that enters cosine-distributed.
+    """
+    return simulate([Layer(mu_a=1 - alpha, mu_s=alpha)], photons, seed, illumination=illumination, bins=bins, **rest)
+
+
 def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

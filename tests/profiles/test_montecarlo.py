@@ -136,6 +136,27 @@ def test_total_reflection_from_a_denser_outside():
     within(found.specular, found.specular_error, 1 - (1 - outside) / 1.5**2, slack=1e-5)
 
 
+def test_roulette_is_fair():
+    """Forward scattering alone is Beer's law; nearly all of this light has been through roulette, for weights below 1e-4."""
+    found = simulate([Layer(1, 10, 90, 0.999999, 1)], 300_000, seed=24)
+    assert found.transmittance_error < 0.006 * found.transmittance
+    within(found.transmittance, found.transmittance_error, math.exp(-10), slack=1e-3 * math.exp(-10))
+
+
+def test_light_is_bent_between_layers():
+    """A thin sheet scatters light into clear glass 1 mm thick: it leaves at r = tan(theta_2), sin(theta_2) = sin(theta_1) / 1.5."""
+    critical, half = (math.tan(math.asin(sine / 1.5)) for sine in (1, math.sqrt(0.75)))  # grazing, and theta_1 = 60 degrees
+    found = simulate([Layer(1, 0, 100, 0, 1e-3), Layer(1.5, d=1)], 400_000, seed=25, n_below=1.5, bins=[0, half, critical * 1.01, 9])
+    inner, outer, beyond = found.T_single * found.area_mm2
+    assert beyond < 0.005 * inner and outer > 0.1 * inner  # a few run along the sheet first
+    # Scattered at depth t of the sheet, tau = 0.1: int e^(-t) / 2 int_(mu) e^(-(tau - t) / mu) (1 - F(mu)) dmu dt over mu > 1/2.
+    mu, t = np.linspace(0.5, 1, 2001)[:-1], np.linspace(0, 0.1, 401)
+    entered = 1 - fresnel.reflectance(mu, 1 / 1.5)
+    exact = integrate.trapezoid(np.exp(-t) * integrate.trapezoid(np.exp(-(0.1 - t[:, None]) / mu) * entered, mu, axis=1) / 2, t)
+    # Some light that was mirrored at the glass before is scattered once, too: at most 4 % of 5 %.
+    within(inner, found.T_single_error[0] * found.area_mm2[0], exact, slack=0.05 * exact)
+
+
 def test_conservative_slab_returns_everything():
     found = simulate([Layer(1.4, 0, 5, 0.8, 2)], 50_000, seed=12, n_below=1.33)
     assert found.absorbed == pytest.approx(0, abs=5 * found.absorbed_error + 1e-12)
