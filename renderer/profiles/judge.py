@@ -23,11 +23,12 @@ WITHOUT_SINGLE = ("better_dipole", "quantized_diffusion")
 
 @dataclass(frozen=True)
 class Verdict:
-    """One model, one material, one channel. Errors are relative; `total_error` and `curve_error` in per cent, the latter the mean of
+    """One model, one material, one face ("R" or, of a slab, "T") and one channel. Light that passes a slab unscattered is not judged. Errors are relative; `total_error` and `curve_error` in per cent, the latter the mean of
     |R - R_MC| / R_MC over logarithmic rings, `radial_error` is E of eq. 3.1 over them."""
 
     material: str
     model: str
+    face: str
     channel: str
     albedo_prime: float
     montecarlo_total: float
@@ -55,11 +56,9 @@ def _ring_means(reflectance, edges: np.ndarray) -> np.ndarray:
     return (values * area).sum(1) / area.sum(1)
 
 
-def judge(stack: Stack, photons: int, seed: int) -> list[Verdict]:
-    """Every model of one material that can take it, channel by channel."""
-    truth = MonteCarlo(stack, photons, seed)
-    results, edges = truth.results(), truth.edges_mm()
-    candidates: list[tuple] = []
+def _candidates(stack: Stack) -> list[tuple]:
+    """(name, face, curve, total (C,)) of every model that can take the stack."""
+    out, slab = [], np.isfinite(stack.thickness_mm)
     for name in models.MODELS:
         if name == "montecarlo":
             continue
@@ -67,23 +66,37 @@ def judge(stack: Stack, photons: int, seed: int) -> list[Verdict]:
             model = models.make(name, stack)
         except InputError:
             continue  # a model for another kind of stack
-        candidates.append((name, model.reflectance, model.totals()[0]))
-        if name in WITHOUT_SINGLE:
-            extra, total = (lambda r: single.reflectance(stack, r)), single.total(stack)
-            candidates.append((f"{name} + single", lambda r, model=model: model.reflectance(r) + extra(r), model.totals()[0] + total))
+        R, T = model.totals()
+        out.append((name, "R", model.reflectance, R))
+        if slab and T is not None:
+            out.append((name, "T", model.transmittance, T))
+        if name in WITHOUT_SINGLE and not slab:
+            once = lambda r, model=model: model.reflectance(r) + single.reflectance(stack, r)  # noqa: E731
+            out.append((f"{name} + single", "R", once, R + single.total(stack)))
+    return out
+
+
+def judge(stack: Stack, photons: int, seed: int) -> list[Verdict]:
+    """Every model of one material that can take it, face by face and channel by channel."""
+    truth = MonteCarlo(stack, photons, seed)
+    results, edges, entered = truth.results(), truth.edges_mm(), truth.entered()
+    where = f"{stack.name} {stack.thickness_mm:g} mm" if len(stack.layers) == 1 and np.isfinite(stack.thickness_mm) else stack.name
     out = []
-    for name, reflectance, total in candidates:
-        means = _ring_means(reflectance, edges[1:])
+    for name, face, curve, total in _candidates(stack):
+        means = _ring_means(curve, edges[1:])
         for c, result in enumerate(results):
             mfp = min(layer.medium.mfp[c] for layer in stack.layers)
-            R, error = result.R[1:] / truth.entered(), result.R_error[1:] / truth.entered()
+            R, error = (getattr(result, key)[1:] / entered for key in (face, f"{face}_error"))
             seen = (edges[1:-1] >= RANGE_MFP[0] * mfp) & (edges[2:] <= RANGE_MFP[1] * mfp) & (R > 0) & (error < KNOWN * R)
             if not seen.any():
-                raise InputError(f"{photons} photons leave no ring of {stack.name} known to {100 * KNOWN:g} %; expected more photons")
+                raise InputError(f"{photons} photons leave no ring of {where} known to {100 * KNOWN:g} %; expected more photons")
             area, miss = np.diff(edges[1:] ** 2)[seen], means[seen, c] - R[seen]
-            known, deviation = result.diffuse_reflectance / truth.entered(), result.diffuse_reflectance_error / truth.entered()
+            if face == "R":
+                known, deviation = result.diffuse_reflectance / entered, result.diffuse_reflectance_error / entered
+            else:
+                known, deviation = (result.transmittance - result.ballistic) / entered, result.transmittance_error / entered
             out.append(Verdict(
-                stack.name, name, CHANNELS[c], float(stack.layers[0].medium.albedo_prime[c]), known, deviation, float(total[c]),
+                where, name, face, CHANNELS[c], float(stack.layers[0].medium.albedo_prime[c]), known, deviation, float(total[c]),
                 100 * (float(total[c]) / known - 1), 100 * float(np.abs(miss / R[seen]).mean()),
                 100 * float(np.sqrt((area * miss**2).sum() / (area * R[seen] ** 2).sum())), int(seen.sum())))
     return out
@@ -100,18 +113,25 @@ def to_csv(verdicts: list[Verdict]) -> str:
 
 
 def to_markdown(verdicts: list[Verdict]) -> str:
-    """One row a material and model: errors of the total and of the curve, R / G / B, and the worst verdict."""
+    """One row a material, model and face: errors of the total and of the curve, R / G / B, and the verdicts."""
     order = ("good", "fair", "poor", "bad")
     lines = ["| material | model | total, error in % (R / G / B) | curve, mean error in % (R / G / B) | verdict |", "|---|---|---|---|---|"]
-    keys = dict.fromkeys((v.material, v.model) for v in verdicts)
-    for material, model in keys:
-        rows = [v for v in verdicts if (v.material, v.model) == (material, model)]
+    for material, model, face in dict.fromkeys((v.material, v.model, v.face) for v in verdicts):
+        rows = [v for v in verdicts if (v.material, v.model, v.face) == (material, model, face)]
         words = sorted({v.words for v in rows}, key=order.index)
-        lines.append(f"| {material} | {model} | {' / '.join(f'{v.total_error:+.1f}' for v in rows)} | "
+        lines.append(f"| {material} | {model}{', T' if face == 'T' else ''} | {' / '.join(f'{v.total_error:+.1f}' for v in rows)} | "
                      f"{' / '.join(f'{v.curve_error:.1f}' for v in rows)} | {words[0] if len(words) == 1 else f'{words[0]} to {words[-1]}'} |")
     return "\n".join(lines) + "\n"
 
 
-def judge_presets(names=MATERIALS, photons: int = 1_000_000, seed: int = 0) -> list[Verdict]:
-    """The table for several presets."""
-    return [verdict for name in names for verdict in judge(preset(name), photons, seed)]
+def judge_presets(names=MATERIALS, thickness_mm: float | None = None, photons: int = 1_000_000, seed: int = 0) -> list[Verdict]:
+    """The table for several presets, half-spaces or slabs of one thickness."""
+    out = []
+    for name in names:
+        stack = preset(name)
+        if thickness_mm is not None:
+            if len(stack.layers) > 1:
+                raise InputError(f"{name} has layers of its own; expected no thickness with it")
+            stack = Stack.of(stack.layers[0].medium, thickness_mm)
+        out += judge(stack, photons, seed)
+    return out

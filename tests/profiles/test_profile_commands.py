@@ -142,6 +142,8 @@ BAD_MEDIUM = ("profile", "dipole", "--out", "a.csv")
     ("redraw", "out", "--figure", "9.9"),
     ("judge", "--medium", "butter", "--out", "a.csv"),
     ("judge", "--out", "a.svg"),
+    ("judge", "--medium", "skin_three_layers", "--thickness", "1", "--out", "a.csv"),
+    ("judge", "--medium", "skin1", "--thickness", "-1", "--out", "a.csv"),
 ], ids=lambda args: " ".join(args))
 def test_bad_input_is_one_line_and_writes_nothing(run, tmp_path, args):
     code, out, err = run(*args)
@@ -193,6 +195,18 @@ def test_judge_knows_what_is_known():
     text = judge.to_markdown(list(verdicts.values()))
     assert "| dark | dipole |" in text and text.count("\n") == len(verdicts) + 2
     assert len(rows(judge.to_csv(list(verdicts.values())))) == len(verdicts)
+
+
+def test_judge_command_for_a_slab(run, tmp_path):
+    """facts B.3: marble's multipole of 4 mm is 1 % from Monte Carlo in R and T; here 2 mm and few photons."""
+    code, out, _ = run("judge", "--medium", "marble", "--thickness", 2, "--photons", 60000, "--out", "s.csv")
+    assert code == 0 and out.startswith("s.csv: ")
+    found = {(row["model"], row["face"], row["channel"]): row for row in rows((tmp_path / "s.csv").read_text())}
+    for face in "RT":
+        assert abs(float(found["multipole", face, "R"]["total_error"])) < 6
+        assert abs(float(found["quantized_diffusion", face, "R"]["total_error"])) < 6
+        assert found["multipole", face, "G"]["model_total"] == found["layered", face, "G"]["model_total"]
+    assert ("dipole", "T", "R") not in found and found["multipole", "R", "R"]["material"] == "marble 2 mm"
 
 
 def test_reach_holds_the_light():
