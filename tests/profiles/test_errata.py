@@ -3,6 +3,9 @@
 Numbers "printed" were recomputed from the formula as the document prints it; facts A of the project holds the same ones.
 """
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -133,3 +136,18 @@ def test_004_exit_weights_lack_a_quarter_and_a_half():
     c_phi, c_e = fresnel.exit_weights(1.4)
     assert (4 * c_phi, 2 * c_e) == pytest.approx((1 - fresnel.two_c1_fit(1.4), 1 - fresnel.three_c2_fit(1.4)))  # what is printed
     assert 2 * (R[0] + T[0]) > 1.9  # the smaller of the two factors alone
+
+
+def test_the_list_names_tests_that_exist():
+    text = Path(__file__).resolve().parents[2].joinpath("docs/profiles.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(test_\w+)::(test_\w+)", text)
+    assert len(named) > 20
+    for module, name in named:
+        source = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
+        assert f"\ndef {name}" in source, f"{module}::{name}"
+
+
+def test_the_page_shows_figures_that_exist():
+    docs = Path(__file__).resolve().parents[2] / "docs"
+    shown = re.findall(r"\]\((figures/[^)]+)\)", (docs / "profiles.md").read_text(encoding="utf-8"))
+    assert len(shown) >= 12 and all((docs / path).is_file() for path in shown)
