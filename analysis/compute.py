@@ -29,6 +29,7 @@ otherwise they come from a bootstrap over participants (`analysis.bootstrap`). P
     sensitivity     framing,conclusion,a,b,everyone,without_excluded,changed                    with and without the excluded
     familiarity_interaction framing,technique,n,slope,low,high,spearman,p,holm_p,detectable     detectable: the correlation found
                                                                                                 with a power of 0.8
+    notes           table,note                                                                  what was refused, and why
 """
 
 from __future__ import annotations
@@ -70,4 +71,5 @@ def everything(responses: Responses, options: Options | None = None) -> Results:
         "familiarity_interaction": inference.familiarity_interaction(responses, options),
     }
     notes = {name: table.attrs.get("notes", ()) for name, table in tables.items()}
-    return Results(tables, notes, options)
+    lines = [(name, line) for name, said in notes.items() for line in said]
+    return Results(tables | {"notes": pd.DataFrame(lines, columns=["table", "note"])}, notes, options)

@@ -110,7 +110,10 @@ def _worth(panel: Panel, model: str, options: Options) -> tuple[np.ndarray, np.n
     if model == "ordinal":
         fit = fitted(panel)
         if fit is None:
-            return empty, empty, empty, ["no finite worths: the likelihood has no maximum that could be found"]
+            return empty, empty, empty, [
+            "no finite worths: no maximum of the likelihood was found; with few answers a participant tastes, thresholds and worths "
+            "can grow together without end"
+        ]
         half = stats.norm.ppf((1 + options.level) / 2) * fit.errors
         return fit.worth, fit.worth - half, fit.worth + half, _caveats(panel, fit)
     estimate = estimated(panel, model, options)

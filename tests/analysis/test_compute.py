@@ -28,6 +28,7 @@ COLUMNS = {
     "repeats,repeat_share,agreement_with_others,excluded",
     "sensitivity": "framing,conclusion,a,b,everyone,without_excluded,changed",
     "familiarity_interaction": "framing,technique,n,slope,low,high,spearman,p,holm_p,detectable",
+    "notes": "table,note",
 }
 
 

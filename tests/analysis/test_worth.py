@@ -329,6 +329,16 @@ def test_separated_answers_are_refused(lines):
     assert np.isnan(davidson(won, level)[0]).all() and np.isnan(davidson(won, level)[1])
 
 
+def test_tastes_that_grow_without_end_are_refused(crowd, table):
+    """Twenty people with strong tastes, three answers each: among 40 such studies one at least has no maximum."""
+    found = next(
+        worths(table(other), Options(resamples=100, models=("ordinal",)))
+        for other in (crowd(20, [-1, -2, 2], seed=seed, taste=6.0, cuts=(2.0, 4.0)) for seed in range(40))
+        if ordinal(other) is None and missing_fit(other, "ordinal") is None
+    )
+    assert found.estimate.isna().all() and "can grow together without end" in found.attrs["notes"][0]
+
+
 def test_two_techniques_have_the_log_odds(lines):
     found = worths(lines(*["a>b"] * 12, *["a<<b"] * 4), Options(resamples=100)).set_index(["model", "technique"]).estimate
     assert found["bradley_terry", "a"] - found["bradley_terry", "b"] == pytest.approx(np.log(3))
