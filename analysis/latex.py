@@ -21,6 +21,7 @@ PREAMBLE = r"""% Tables with booktabs. Compile this file alone, or \input the pa
 \usepackage[a4paper,landscape,margin=15mm]{geometry}
 \usepackage{booktabs,longtable}
 \setlength{\tabcolsep}{3.5pt}
+\setlength{\LTcapwidth}{\textwidth}
 \begin{document}
 """
 

@@ -28,23 +28,24 @@ for finding in responses.findings:
 
 # %%
 results = everything(responses, Options(margin=0.25, resamples=1000, seed=1))
-pairs = results.tables["pairs"].set_index(["framing", "a", "b"])
-about = pairs.loc[(slice(None), "golubev", "golubev_plus"), ["n", "mean_preference", "low", "high", "holm_p", "tost_p"]]
-print(about.to_string(float_format="%.3f"))
+a, b = (name for name in responses.codebook.techniques if name in ("golubev", "golubev_plus"))  # in the table's order
+pairs = results.tables["pairs"]
+about = pairs[(pairs.a == a) & (pairs.b == b)]
+print(about[["framing", "a", "b", "n", "mean_preference", "low", "high", "holm_p", "tost_p"]].to_string(index=False, float_format="%.3f"))
 
 # %% [markdown]
 # The answers themselves are in `responses.frame`, turned to the pair: negative prefers `a`, positive prefers `b`.
 
 # %%
 frame = responses.frame
-frame = frame[(frame.a == "golubev") & (frame.b == "golubev_plus")]
+frame = frame[(frame.a == a) & (frame.b == b)]
 figure = Figure(figsize=(NARROW_IN, 2.4), layout="constrained")
 ax = figure.subplots()
 for value, colour in ((-1, BLUE), (0, "#8A8A8A"), (1, VERMILLION)):
     seconds = (frame.rt_ms[frame.preference.clip(-1, 1) == value] / 1000).sort_values()
     if len(seconds):
         ax.step(seconds, [(place + 1) / len(seconds) for place in range(len(seconds))], where="post", color=colour)
-        label = {-1: "Golubev", 0: "no difference", 1: "Golubev Plus"}[value]
+        label = {-1: a, 0: "no difference", 1: b}[value]
         ax.plot([], [], color=colour, label=f"{label} ({len(seconds)})")
 ax.set_xlabel("time of the answer, s", size=8)
 ax.set_ylabel("share of answers so far", size=8)
