@@ -13,6 +13,7 @@ import numpy as np
 from renderer.errors import InputError
 
 NODES = 200
+FIT_RANGE = (0.5, 2.2)  # relative indices within which each polynomial is right to 0.007; outside they run away
 
 
 def _check(eta: float) -> float:
@@ -82,8 +83,8 @@ def three_c2_fit(eta: float) -> float:
 
 
 def extrapolation(eta: float, fit: bool = True) -> float:
-    """A = (1 + F_dr) / (1 - F_dr) of the classic boundary. seeds/001 sec. 4.2.2 prints its reciprocal."""
-    f = diffuse_reflectance_fit(eta) if fit else diffuse_reflectance(eta)
+    """A = (1 + F_dr) / (1 - F_dr) of the classic boundary, by the polynomial where it holds. seeds/001 sec. 4.2.2 prints its reciprocal."""
+    f = diffuse_reflectance_fit(eta) if fit and FIT_RANGE[0] <= eta <= FIT_RANGE[1] else diffuse_reflectance(eta)
     return (1 + f) / (1 - f)
 
 
@@ -94,8 +95,8 @@ def better_extrapolation(eta: float, fit: bool = True) -> float:
 
 
 def exit_moments(eta: float, fit: bool = True) -> tuple[float, float]:
-    """(2 C_1, 3 C_2) by the polynomials or exactly."""
-    return (two_c1_fit(eta), three_c2_fit(eta)) if fit else (2 * moment(1, eta), 3 * moment(2, eta))
+    """(2 C_1, 3 C_2) by the polynomials where they hold, or exactly."""
+    return (two_c1_fit(eta), three_c2_fit(eta)) if fit and FIT_RANGE[0] <= eta <= FIT_RANGE[1] else (2 * moment(1, eta), 3 * moment(2, eta))
 
 
 def exit_weights(eta: float, fit: bool = True) -> tuple[float, float]:

@@ -18,6 +18,7 @@ from renderer.profiles.model import Profile, radii
 from renderer.profiles.multipole import Multipole
 
 FFT_SIZE = 2048  # points a side at most
+FARTHEST = 3e4  # radii that the Hankel transform takes, in the finest length of the stack
 
 
 class Faces(NamedTuple):
@@ -98,6 +99,9 @@ class Layered(Profile):
     def _hankel(self, r_mm) -> tuple[np.ndarray, np.ndarray]:
         """f(r) = (1 / 2 pi) int f(k) J0(k r) k dk, radii of one octave at a time."""
         r = radii(r_mm)[:, 0]
+        if r.max() > FARTHEST * self._finest_mm():
+            raise InputError(f"{self.name}: a radius of {r.max():.3g} mm is too far for layers as fine as {self._finest_mm():.3g} mm; "
+                             f"expected at most {FARTHEST * self._finest_mm():.3g} mm")
         out = np.empty((len(r), 2 * self.stack.channels))
         octave = np.floor(np.log2(np.maximum(r / self._finest_mm(), 1)))
         for each in np.unique(octave):

@@ -70,6 +70,11 @@ class Multipole(Profile):
                 out += pole(r, depth - z_r, m.sigma_tr) - pole(r, depth - z_v, m.sigma_tr)
             else:
                 out += pole(r, z_r, m.sigma_tr) - pole(r, z_v, m.sigma_tr)
+        if not self.images:
+            # The images beyond, 2 i P >> r: each pair is the slope of a pole along z, -2 (1 + x + x^2 / 2) exp(-x) / (4 pi z^3), x = sigma_tr z.
+            x = m.sigma_tr * 2 * P * (n + 0.5)
+            rest = (m.mfp + z_above) * (1 + x + x**2 / 2) * np.exp(-x) / (8 * np.pi * P**3 * (n + 0.5) ** 2)
+            out += rest if depth else -rest
         return m.albedo_prime * out
 
     def reflectance(self, r_mm):

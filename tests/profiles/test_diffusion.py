@@ -115,6 +115,16 @@ def test_hankel_is_the_sum_over_images():
     np.testing.assert_allclose(Layered(stack).transmittance(r), Multipole(stack).transmittance(r), rtol=1e-8)
 
 
+def test_images_beyond_the_last_one_are_not_forgotten():
+    """Nothing absorbs, so the sum over images ends slowly; Hankel's spectrum has no end to it."""
+    stack = one(0.0, 10.0, 1.3, 2.0)
+    r = np.array([0.1, 1.0, 4.0, 6.0])
+    np.testing.assert_allclose(Multipole(stack).transmittance(r), Layered(stack).transmittance(r), rtol=1e-5)
+    np.testing.assert_allclose(Multipole(stack).reflectance(r), Layered(stack).reflectance(r), rtol=1e-5)
+    with pytest.raises(InputError, match="too far"):
+        Layered(stack).reflectance([1e6])
+
+
 @pytest.mark.parametrize("stack", [
     Stack(tuple(Layer(Medium((0.02,), (2.0,), 1.0), 1.0) for _ in range(2)), name="halves"),
     Stack((Layer(Medium((0.1,), (4.0,), 1.5), 0.7), Layer(Medium((0.02,), (1.5,), 1.3), 2.0), Layer(Medium((0.3,), (2.0,), 1.4))), name="three indices"),

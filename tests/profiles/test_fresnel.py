@@ -51,6 +51,14 @@ def test_extrapolation_is_not_its_reciprocal(eta, A):
     assert fresnel.extrapolation(eta) == pytest.approx(A, abs=6e-4)
 
 
+@pytest.mark.parametrize("eta", [0.2, 0.4, 0.5, 0.99, 1.01, 2.2, 2.5, 4.0])
+def test_no_polynomial_is_used_where_it_runs_away(eta):
+    """At 3, the one of 3 C_2 is off by 0.2 and the better dipole's total would be 817."""
+    np.testing.assert_allclose(fresnel.exit_moments(eta), (2 * fresnel.moment(1, eta), 3 * fresnel.moment(2, eta)), atol=7e-3)
+    f = fresnel.diffuse_reflectance(eta)
+    assert fresnel.extrapolation(eta) == pytest.approx((1 + f) / (1 - f), rel=0.012)
+
+
 def test_rough_face_tends_to_the_smooth_one():
     smooth = fresnel.diffuse_reflectance(1.4)
     values = [fresnel.rough_diffuse_reflectance(1.4, m) for m in (0.01, 0.1, 0.3)]
