@@ -45,9 +45,9 @@ def simulations(effort: float, seed: int) -> dict:
     """Rings of every albedo: {(diffuse, A): (alpha, share (rings,), error (rings,), total, its error)}."""
     found = {}
     for diffuse in (False, True):
-        for A in tqdm(ALBEDOS, desc="diffuse" if diffuse else "searchlight", unit="albedo", disable=None):
+        for i, A in enumerate(tqdm(ALBEDOS, desc="diffuse" if diffuse else "searchlight", unit="albedo", disable=None)):
             alpha = chandrasekhar.albedo_of(float(A), diffuse)
-            result = half_space(alpha, photons_for(alpha, effort), seed, "diffuse" if diffuse else "searchlight", EDGES)
+            result = half_space(alpha, photons_for(alpha, effort), 200 * seed + 100 * diffuse + i, "diffuse" if diffuse else "searchlight", EDGES)
             found[diffuse, A] = (alpha, result.R * result.area_mm2, result.R_error * result.area_mm2, result.diffuse_reflectance, result.diffuse_reflectance_error)
     return found
 
@@ -78,8 +78,8 @@ def judge(name: str, found: dict, shortest: float, longest: float, own_length: b
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Burley's curve fits against Monte Carlo.")
-    parser.add_argument("--effort", type=float, default=5e4, help="events / 64 walked for each albedo; errors fall with its square root")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the photons")
+    parser.add_argument("--effort", type=float, default=1e5, help="events / 64 walked for each albedo; errors fall with its square root")
+    parser.add_argument("--seed", type=int, default=0, help="draws the photons; every simulation has a seed of its own that follows from it")
     arguments = parser.parse_args()
     found = simulations(arguments.effort, arguments.seed)
     off = [(total - A) / error for (_, A), (*_, total, error) in found.items()]
