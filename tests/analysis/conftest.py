@@ -44,12 +44,13 @@ def answer():
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Figures without their drawing, which takes most of a report's time: for tests of words and tables."""
+    """Figures that are made and not rendered, which takes most of a report's time: for tests of words and tables."""
     from analysis import figures
 
     svg = b'<svg xmlns="http://www.w3.org/2000/svg" width="240pt" height="120pt" viewBox="0 0 240 120"/>'
 
     def picture(name, title, caption, alt, draw, *args, simulated=False):
+        draw(*args)
         return figures.Picture(name, title, caption, f"{figures.SIMULATED}. {alt}" if simulated else alt, svg, b"png", b"pdf")
 
     monkeypatch.setattr(figures, "_picture", picture)
@@ -154,3 +155,43 @@ def lines(write, answer):
         return read_responses(write(rows), order=names)
 
     return lines
+
+
+@pytest.fixture(scope="session")
+def studies(tmp_path_factory, random_study):
+    """simulated or not -> Responses of 8 people."""
+    from analysis import read_responses
+
+    found = {}
+    for simulated in (False, True):
+        path = tmp_path_factory.mktemp("study") / "responses.csv"
+        lines = [",".join(map(str, (*row, int(simulated)))) for row in random_study(8, seed=4)]
+        path.write_text("\n".join([HEADER + ",simulated", *lines]))
+        found[simulated] = read_responses(path)
+    return found
+
+
+@pytest.fixture(scope="session")
+def real(studies):
+    """All files of a report of people's answers, with declared margins and milliseconds an image; drawn once for all tests."""
+    import pandas as pd
+
+    from analysis.objective import Measured
+    from analysis.options import Options
+    from analysis.report import report_responses
+
+    answers = studies[False]
+    rows = [(framing, name, "milliseconds", float(k), "manifest") for framing, items in answers.items.items() for k, name in enumerate(items)]
+    table = pd.DataFrame(rows, columns=["framing", "technique", "measure", "value", "source"])
+    options = Options(margin=0.25, margin_jod=0.5, resamples=100, seed=3)
+    return report_responses(
+        answers, options=options, declared="declared in the study file", measured=Measured(table, ("The manifest holds no FLIP.",))
+    )
+
+
+@pytest.fixture(scope="session")
+def simulated(studies):
+    """All files of a report of simulated answers, with nothing declared; drawn once for all tests."""
+    from analysis.report import report_responses
+
+    return report_responses(studies[True])

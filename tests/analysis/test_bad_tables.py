@@ -1,0 +1,100 @@
+"""Tables that a method cannot answer for: the whole report is still made, and says in words what it cannot say in numbers."""
+
+import io
+import re
+from html import unescape
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import read_responses
+from analysis.options import Options
+from analysis.report import report_responses
+
+
+def in_short(files):
+    page = files["report.html"].decode()
+    part = page[page.index("<h2>In short") : page.index("</section>")]
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", part)).split())
+
+
+def worths(files):
+    return pd.read_csv(io.BytesIO(files["tables/worths.csv"]))
+
+
+@pytest.fixture
+def report(undrawn, write, answer):
+    """report(people, names, give, pairs) -> files; give(rng, a, b) is the answer, negative for a."""
+
+    def report(people, names, give, pairs=None, framings=("close-up",)):
+        rng = np.random.default_rng(0)
+        rows = [
+            answer(f"P{person}", framing, a, b, give(rng, a, b), familiarity=1 + person % 5)
+            for person in range(people)
+            for framing in framings
+            for a, b in (pairs or combinations(names, 2))
+        ]
+        return report_responses(read_responses(write(rows), order=names), options=Options(margin=0.25, margin_jod=0.5, resamples=100))
+
+    return report
+
+
+def any_answer(rng, a, b):
+    return int(rng.integers(-2, 3))
+
+
+def test_one_participant_has_counts_and_no_tests(report):
+    files = report(1, ["a", "b", "c"], any_answer)
+    assert "too few people answered to test any pair" in in_short(files)
+    assert pd.read_csv(io.BytesIO(files["tables/pairs.csv"])).wilcoxon_p.isna().all()
+    assert "figures/scores.svg" in files
+
+
+def test_fewer_people_than_a_test_needs(report):
+    assert "too few people answered to test any pair" in in_short(report(4, ["a", "b", "c"], any_answer))
+
+
+def test_one_pair(report):
+    text = in_short(report(8, ["a", "b"], any_answer))
+    assert "1 of 1 pair is undecided" in text
+
+
+def test_only_ties_have_no_worths_and_no_winner(report):
+    files = report(8, ["a", "b", "c"], lambda *_: 0)
+    text = in_short(files)
+    assert "every answer is 'no difference'" in text and "preferred" not in text.split("What was counted")[0]
+    assert worths(files).estimate.isna().all() and "figures/jod_ladder.svg" not in files
+
+
+def test_no_ties_at_all(report):
+    found = worths(report(12, ["a", "b", "c"], lambda rng, a, b: int(rng.choice([-2, -1, 1, 2]))))
+    assert found[found.model == "bradley_terry"].estimate.notna().all()
+
+
+def test_an_unbeaten_technique_is_named_and_has_no_number(report):
+    files = report(8, ["a", "b", "c"], lambda rng, a, b: -2 if a == "a" else any_answer(rng, a, b))
+    assert "a was never beaten by b, c" in in_short(files)
+    assert worths(files).query("model == 'thurstone_jod'").estimate.isna().all()
+
+
+def test_groups_that_never_met_are_named(report):
+    text = in_short(report(8, list("abcd"), any_answer, pairs=[("a", "b"), ("c", "d")]))
+    assert "were never compared, not even through others" in text and "No priorities: 4 pairs had no answer." in text
+
+
+def test_eleven_techniques(report):
+    text = in_short(report(6, [f"t{k}" for k in range(11)], any_answer))
+    assert "there is no random index beyond 10 items" in text and "all 55 pairs are undecided" in text
+
+
+def test_everyone_excluded_leaves_nothing_to_conclude_again(report):
+    assert "those who are left are too few" in in_short(report(6, ["a", "b", "c"], lambda *_: 1))
+
+
+def test_letters_without_a_glyph_are_said(write, answer):
+    from analysis import figures
+
+    picture = figures._picture("x", "t", "c.", "a", lambda: figures.Figure(layout="constrained").text(0, 0, "日本").figure)
+    assert "Some letters of its names are not in the figure's font" in picture.caption
