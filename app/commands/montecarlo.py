@@ -18,7 +18,7 @@ import click
 @click.option("--n-above", default=1.0, show_default=True, help="Index of refraction above the top layer.")
 @click.option("--n-below", default=1.0, show_default=True, help="Index of refraction below the last layer.")
 @click.option("--r-max", "r_max_mm", type=float, metavar="MM", help="Radius of the last ring, mm. Without it one that holds nearly all of the light.")
-@click.option("--bins", default=120, show_default=True, type=click.IntRange(1), help="How many rings the radius is cut into, the finest in the middle.")
+@click.option("--bins", default=120, show_default=True, type=click.IntRange(1, 10_000), help="How many rings the radius is cut into, the finest in the middle.")
 @click.option("--no-cache", is_flag=True, help="Walk anew and keep nothing; else results are kept and interrupted runs go on.")
 @click.option("--json", "as_json", is_flag=True, help="Write one JSON object with everything, instead of two tables.")
 def command(layers, photons, seed, illumination, n_above, n_below, r_max_mm, bins, no_cache, as_json) -> None:

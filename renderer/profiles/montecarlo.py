@@ -27,7 +27,7 @@ from renderer.errors import InputError
 BATCHES = 64
 CHUNK, CHUNK_S = 256, 0.02  # photons between two looks at the stop sign: this many at first, then as many as take that long
 SAVE_EVERY_S = 30.0
-BINS, ANGLES = 120, 90
+BINS, MOST_BINS, ANGLES = 120, 10_000, 90
 ILLUMINATIONS = ("searchlight", "diffuse")
 
 
@@ -107,6 +107,8 @@ class Setting:
             raise InputError(f"illumination is {self.illumination!r}; expected {' or '.join(ILLUMINATIONS)}")
         object.__setattr__(self, "seed", _whole("seed", self.seed, 0))
         edges = np.array(self.edges_mm)
+        if len(edges) - 1 > MOST_BINS:
+            raise InputError(f"there are {len(edges) - 1} bins; expected {MOST_BINS} at most")
         if len(edges) < 2 or not np.isfinite(edges).all() or edges[0] != 0 or (np.diff(edges) <= 0).any():
             raise InputError("the edges of the bins are not rising numbers; expected 0 < r1 < r2 < ..., in mm, 0 first")
 
@@ -299,7 +301,7 @@ def simulate(
     layers = tuple(layers)
     photons, threads = _whole("photons", photons, BATCHES), _cores() if threads is None else _whole("threads", threads, 1)
     if np.ndim(bins) == 0:
-        count = _whole("bins", bins, 1)
+        count = min(_whole("bins", bins, 1), MOST_BINS + 1)  # more than enough to be refused
         reach = default_reach_mm([layer for layer in layers if isinstance(layer, Layer)]) if r_max_mm is None else r_max_mm
         if _number("r_max_mm", reach, 0, "a radius in mm, more than 0") == 0:
             raise InputError("r_max_mm is 0; expected a radius in mm, more than 0")

@@ -371,7 +371,7 @@ def test_bad_layers(bad, says):
      (dict(photons=10), "photons is 10"), (dict(photons=1e6), "photons is 1000000.0"), (dict(seed=-1), "seed is -1"),
      (dict(seed=0.5), "seed is 0.5"), (dict(n_above=0.5), "n_above is 0.5"), (dict(n_below=math.nan), "n_below is nan"),
      (dict(illumination="sun"), "illumination is 'sun'"), (dict(r_max_mm=0), "r_max_mm is 0"), (dict(r_max_mm=-1), "r_max_mm is -1"),
-     (dict(bins=0), "bins is 0"), (dict(bins=[0, 2, 1]), "rising"), (dict(bins=[1, 2]), "rising"), (dict(bins=[0, math.nan]), "rising"),
+     (dict(bins=0), "bins is 0"), (dict(bins=10**9), "10000 at most"), (dict(bins=[0, 2, 1]), "rising"), (dict(bins=[1, 2]), "rising"), (dict(bins=[0, math.nan]), "rising"),
      (dict(bins=[0, 1], r_max_mm=1), "both given"), (dict(threads=-1), "threads is -1")],
 )  # fmt: skip
 def test_bad_simulations(own_cache, bad, says):
