@@ -34,7 +34,7 @@ OPTIONS = (
     click.option("--g", type=float, help="Mean cosine of scattering of the medium given by numbers, for montecarlo; 0 if not given."),
     click.option("--thickness", type=float, metavar="MM", help="Thickness of the slab in mm; a half-space if not given."),
     click.option("--n-below", type=float, default=1.0, show_default=True, help="Index of refraction under the slab."),
-    click.option("--roughness", type=float, default=0.0, show_default=True, help="Beckmann slope of the lit face, 0 to 1 (dipole, multipole, layered)."),
+    click.option("--roughness", type=float, default=0.0, show_default=True, help="Beckmann slope of the lit face, 0 to 1 (dipole, multipole, layered, gaussian_sum)."),
     click.option("--layer", "layers", multiple=True, metavar='"sigma_a=R,G,B sigma_s_prime=R,G,B eta=N d=MM"',
                  help="A layer, from the lit face down; repeat for more, instead of --medium. g=G may be added; without d it is infinite."),
 )

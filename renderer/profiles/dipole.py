@@ -37,6 +37,7 @@ class Dipole(Profile):
 
     name: ClassVar[str] = "dipole"
     paper: ClassVar[str] = "Jensen et al. 2001"
+    knows_roughness: ClassVar[bool] = True
     knows_thickness: ClassVar[bool] = False
 
     def reflectance(self, r_mm):

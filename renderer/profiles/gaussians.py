@@ -160,6 +160,7 @@ class GaussianSum(Profile):
     paper: ClassVar[str] = "d'Eon and Luebke 2007"
     layers: ClassVar[int] = 0
     knows_thickness: ClassVar[bool] = False
+    knows_roughness: ClassVar[bool] = True
 
     def fits(self) -> list[Fit]:
         """One fit a channel."""

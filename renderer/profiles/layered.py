@@ -59,6 +59,7 @@ class Layered(Profile):
 
     name: ClassVar[str] = "layered"
     paper: ClassVar[str] = "Donner and Jensen 2005"
+    knows_roughness: ClassVar[bool] = True
     layers: ClassVar[int] = 0
 
     def __post_init__(self):

@@ -23,7 +23,8 @@ def radii(r_mm) -> np.ndarray:
 class Profile:
     """Base of all profiles. R and T are per unit of flux that has entered the medium, in 1/mm^2.
 
-    layers: how many the model can take (0: any number); knows_thickness: whether a finite slab differs from a half-space.
+    layers: how many the model can take (0: any number); knows_thickness: whether a finite slab differs from a half-space;
+    knows_roughness: whether it can take a rough face.
     """
 
     stack: Stack
@@ -32,10 +33,13 @@ class Profile:
     paper: ClassVar[str]
     layers: ClassVar[int] = 1
     knows_thickness: ClassVar[bool] = True
+    knows_roughness: ClassVar[bool] = False
 
     def __post_init__(self):
         if self.layers and len(self.stack.layers) != self.layers:
             raise InputError(f"{self.name} is for one layer, got {len(self.stack.layers)}; expected layered or montecarlo for more")
+        if self.stack.roughness and not self.knows_roughness:
+            raise InputError(f"{self.name} knows smooth faces only, got a roughness of {self.stack.roughness:g}; expected 0, or dipole, multipole or layered")
 
     @property
     def medium(self) -> Medium:

@@ -40,6 +40,7 @@ class Multipole(Profile):
 
     name: ClassVar[str] = "multipole"
     paper: ClassVar[str] = "Donner and Jensen 2005"
+    knows_roughness: ClassVar[bool] = True
 
     def __post_init__(self):
         super().__post_init__()

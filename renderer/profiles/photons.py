@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from renderer.errors import InputError
 from renderer.profiles import fresnel
 from renderer.profiles.model import Profile, radii
 
@@ -26,11 +25,6 @@ class MonteCarlo(Profile):
     name: ClassVar[str] = "montecarlo"
     paper: ClassVar[str] = "Wang, Jacques and Zheng 1995"
     layers: ClassVar[int] = 0
-
-    def __post_init__(self):
-        super().__post_init__()
-        if self.stack.roughness:
-            raise InputError("montecarlo knows smooth faces only; expected roughness 0")
 
     def entered(self) -> float:
         """1 - F: the share of the light that enters."""

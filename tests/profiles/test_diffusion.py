@@ -271,6 +271,9 @@ def test_bad_use():
         models.make("tripole", preset("skin1"))
     with pytest.raises(InputError, match="one layer, got 3"):
         Dipole(SKIN_THREE_LAYERS)
+    for name in ("better_dipole", "quantized_diffusion", "burley", "montecarlo"):
+        with pytest.raises(InputError, match="smooth faces only"):
+            models.make(name, Stack.of(MEDIA["skin1"], roughness=0.3))
     with pytest.raises(InputError, match="radius"):
         Dipole(preset("skin1")).reflectance([-1.0])
     with pytest.raises(InputError, match="radius"):
