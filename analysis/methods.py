@@ -6,6 +6,7 @@ import platform
 from collections.abc import Mapping
 from importlib import metadata
 
+from .conclusions import count
 from .options import Options
 from .responses import Responses
 from .shown import alpha_of
@@ -64,15 +65,18 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
     kind = "SIMULATED participants (programs, not people)" if responses.simulated else "participants"
     pairs = sum(len(items) * (len(items) - 1) // 2 for items in responses.items.values())
     asked = len(frame[["framing", "a", "b"]].drop_duplicates())
-    names = ", ".join(responses.codebook.label(name) for name in responses.codebook.techniques)
+    present = {name for items in responses.items.values() for name in items}
+    names = ", ".join(responses.codebook.label(name) for name in responses.codebook.techniques if name in present)
+    unused = len(responses.findings)
+    rows = "every row of the table was used" if not unused else f"{count(unused, 'row')} of the table could not be used"
     found = [
         (
             "Answers",
-            f"{responses.participants} {kind} compared images in pairs: {names}; at {len(responses.items)} framings "
+            f"{responses.participants} {kind} compared images in pairs: {names}; at {count(len(responses.items), 'framing')} "
             f"({', '.join(responses.codebook.framing_label(name) for name in responses.items)}), {asked} of {pairs} pairs in all. They "
             "answered on a scale from \N{MINUS SIGN}2 (strong preference for the left image) over 0 (no difference seen) to 2 (strong "
-            f"preference for the right one). {len(frame)} answers were analysed; {len(responses.findings)} rows of the table could not "
-            "be used. Sides and order were as the table gives them; answers were turned to the pair before anything was computed.",
+            f"preference for the right one). {len(frame)} answers were analysed; {rows}. "
+            "Sides and order were as the table gives them; answers were turned to the pair before anything was computed.",
         ),
         (
             "Scores and priorities",

@@ -81,14 +81,14 @@ def report_responses(
         tables = {name: table.assign(simulated=1) for name, table in tables.items()}
 
     simulated, alpha = responses.simulated, shown.alpha_of(options)
-    pictures = figures.draw_responses(responses, found, pair, slugs)
-    pictures += worth_figures.draw_results(results.tables, codebook, options.margin, alpha, simulated)
+    pictures = worth_figures.draw_results(results.tables, codebook, options.margin, alpha, simulated)
     said = []
     if measured is not None:
         for measure, rows in beside.groupby("measure", sort=False):
             about = objective.MEASURES[measure]
             pictures.append(worth_figures.draw_objective(rows, measure, about, codebook, simulated))
         said = objective.sentences(beside, correlated, measured.notes, codebook)
+    pictures += figures.draw_responses(responses, found, pair, slugs)
     read = shown.all_shown(results.tables, codebook, options)
     concluded = conclusions.conclude(results.tables, results.notes, codebook, options, responses.participants, simulated)
     counted = _summary(responses, scores, totals, sides, comparisons, found, pair)

@@ -68,9 +68,9 @@ def draw_results(
 ) -> list[Picture]:
     """The figures of `compute.everything`'s tables, without those that have nothing to show."""
     drawn = [
-        draw_worths(tables["worths"], codebook, simulated),
-        draw_ladder(tables["worths"], codebook, simulated),
         draw_pairs(tables["pairs"], codebook, margin, alpha, simulated),
+        draw_ladder(tables["worths"], codebook, simulated),
+        draw_worths(tables["worths"], codebook, simulated),
         draw_scores(tables["tallies"], codebook, simulated),
         draw_agreement(tables["agreement"], codebook, simulated),
         draw_triads(tables["participants"], simulated),

@@ -30,8 +30,8 @@ def worths(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 @click.argument("study", metavar="STUDY.toml", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for power.csv, needed.csv, power.md and the figure.")
 @click.option(
-    "--difference", default=0.5, show_default=True, type=float,
-    help="JOD to find, or to exclude: at 1 JOD 75 % of answers prefer one of the two, at 0.5 JOD 63 %.",
+    "--difference", type=float, metavar="JOD",
+    help="To find, or to exclude: at 1 JOD 75 % of answers prefer one of the two. Without it the study's margin_jod, or 0.5.",
 )  # fmt: skip
 @click.option(
     "--pair", callback=names, metavar="A,B",
@@ -56,7 +56,7 @@ def worths(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 @click.option("--slight", type=float, metavar="JOD", help="Below this a person sees no difference: 0.5 without it, or the pilot's.")
 @click.option("--clear", type=float, metavar="JOD", help="From here on a preference is a clear one: 1.8 without it, or the pilot's.")
 @click.option("--taste", type=float, metavar="JOD", help="Spread between people of what they feel of one difference: 0.5 without it.")
-@click.option("--alpha", default=0.05, show_default=True, type=float, help="Level of each test.")
+@click.option("--alpha", type=float, help="Level of each test. Without it one less the study's level, or 0.05.")
 @click.option("--power", "wanted", default=0.8, show_default=True, type=float, help="The power to reach.")
 @click.option(
     "--family", type=int, metavar="N",
@@ -68,7 +68,7 @@ def worths(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 def command(
     study: Path,
     out: Path,
-    difference: float,
+    difference: float | None,
     pair: tuple[str, str] | None,
     assumed: dict[str, float],
     pilot: Path | None,
@@ -77,7 +77,7 @@ def command(
     slight: float | None,
     clear: float | None,
     taste: float | None,
-    alpha: float,
+    alpha: float | None,
     wanted: float,
     family: int | None,
     most: int,
@@ -130,11 +130,11 @@ def command(
     plan = Plan(
         techniques=techniques,
         pair=pair or (known if set(known) <= set(techniques) else techniques[:2]),
-        difference=difference,
+        difference=definition.analysis.get("margin_jod", 0.5) if difference is None else difference,
         worths=table,
         answering=answering,
         answers_each=answers,
-        alpha=alpha,
+        alpha=round(1 - definition.analysis.get("level", 0.95), 10) if alpha is None else alpha,
         power=wanted,
         family=family or len(framings) * len(techniques) * (len(techniques) - 1) // 2,
         most=most,
