@@ -58,13 +58,13 @@ def interval(value: float, low: float, high: float, digits: int = 2) -> str:
 
 
 def probability(p: float | None) -> str:
-    """A p value as journals print it: '<0.001', '0.012', '0.34'."""
+    """A p value as journals print it: '<0.001', '0.012', '0.34', '>0.99'."""
     if p is None or not np.isfinite(p):
         return NOTHING
     if p < 0.001:
         return "<0.001"
-    if p > 0.999:
-        return ">0.999"
+    if p > 0.99:
+        return ">0.99"
     return f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
 
 

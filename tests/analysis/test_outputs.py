@@ -26,7 +26,7 @@ TABLE = Shown("one", "A table", ("Name & co", "p"), (False, True), (("50 % of #1
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0004, "<0.001"), (0.001, "0.001"), (0.0456, "0.046"), (0.1, "0.10"), (0.9996, ">0.999"), (1.0, ">0.999"), (np.nan, "\N{EN DASH}")],
+    [(0.0004, "<0.001"), (0.001, "0.001"), (0.0456, "0.046"), (0.1, "0.10"), (0.99, "0.99"), (0.996, ">0.99"), (1.0, ">0.99"), (np.nan, "\N{EN DASH}")],
 )
 def test_p_values_as_journals_print_them(value, text):
     assert shown.probability(value) == text
