@@ -264,7 +264,8 @@ def _plain(line: str, codebook: Codebook) -> str:
     name, mark, rest = line.partition(":")
     if mark and name in codebook.framings:
         line = f"{codebook.framing_label(name)}:{rest}"
-    return line[:1].upper() + line[1:].rstrip(".") + "."
+    first = line.partition(" ")[0]
+    return (line if "_" in first else line[:1].upper() + line[1:]).rstrip(".") + "."
 
 
 def _digits(value: float | None, digits: int = 3) -> str:

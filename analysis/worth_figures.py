@@ -446,7 +446,8 @@ def draw_power(curves: pd.DataFrame, wanted: float, difference: float, correctio
         f"How many people find, or exclude, {difference:g} JOD",
         f"Share of simulated studies that reach the goal; the dashed line is the wanted power, {wanted:g}; bands are 95 % intervals of "
         "the simulation, dots the closed form where there is one"
-        + ("." if correction == "none" else "; each test at Holm's first step for the whole family."),
+        + ("." if correction == "none" else "; each test at Holm's first step for the whole family.")
+        + ("" if set(curves.framing) == {"any"} else f" Worths of {codebook.framing_label(curves.framing.iloc[0])}."),
         "; ".join(
             f"{goal}, {design}, {test}: "
             + ", ".join(f"{row.people} people {row.power:.2f}" for row in rows.iloc[:: max(1, len(rows) // 5)].itertuples())

@@ -24,7 +24,7 @@ def run(capfd, monkeypatch, tmp_path):
 
 
 def test_verbs():
-    assert set(VERBS) >= {"render", "build", "serve", "simulate", "analyse"}
+    assert set(VERBS) >= {"render", "build", "power", "serve", "simulate", "analyse"}
 
 
 @pytest.mark.parametrize("verb", VERBS)
