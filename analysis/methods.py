@@ -10,6 +10,7 @@ from .conclusions import count
 from .options import Options
 from .responses import Responses
 from .shown import alpha_of
+from .worth import FEW_ANSWERS, NO_TASTE, QUADRATURE_ITEMS
 
 #: Key -> reference, as it is cited.
 REFERENCES = {
@@ -91,7 +92,9 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             "[thurstone1927] in just-objectionable differences (1 JOD: 75 % prefer one of the two) [perezortiz2017], with 'no difference' "
             + ("as half a preference each way" if options.ties == "half" else "left out")
             + "; Davidson's model, in which ties are an outcome of their own [davidson1970]; and a cumulative-logit model of all five answers "
-            "[agresti1992] with a fixed side effect and random effects of participants for techniques and side, by Laplace's approximation. "
+            "[agresti1992] with a fixed side effect and random effects of participants for techniques and side, by Laplace's approximation "
+            f"(by adaptive Gauss-Hermite quadrature for up to {QUADRATURE_ITEMS} techniques and at most {FEW_ANSWERS} answers a person; without "
+            f"random effects where nobody gave more than {NO_TASTE} answers). "
             f"Models fitted: {', '.join(options.models)}. All are maximum likelihood; where it has no finite maximum no worth is given.",
         ),
         (
