@@ -572,6 +572,7 @@ def _markdown(plan: Plan, needed: pd.DataFrame, sentences: list[str], codebook: 
         f"- No difference is seen below {model.slight:.2f} JOD, a preference is clear from {model.clear:.2f} JOD on; people's tastes for",
         f"  a difference spread by {model.taste:.2f} JOD (standard deviation).",
         "- To exclude, the margin is the difference as it shows on the scale of the answers, and the test is two one-sided t tests.",
+        "- The Wilcoxon test is the normal approximation here; `subdermal analyse` takes the exact one for up to 50 people.",
         f"- {plan.studies} simulated studies for each framing, design and truth; alpha {plan.alpha:g}, power {plan.power:g}, "
         f"seed {plan.seed}.",
         f"- numpy {np.__version__}, scipy {_version('scipy')}, subdermal {_version('subdermal')}.",

@@ -5,8 +5,7 @@ Where the thesis shows counts in bars these show estimates with their intervals,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from . import figures, tallies
 from .codebook import Codebook
-from .figures import BLUE, GREEN, GREY, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
+from .figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
 from .options import OVERALL
 
 #: Model -> its name and the unit of its worths.
