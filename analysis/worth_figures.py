@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from . import figures, tallies
+from . import figures
 from .codebook import Codebook
 from .figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
 from .options import OVERALL
