@@ -548,7 +548,8 @@ class _Likelihood:
             # At a spread of 0 the likelihood is even in it: flat there to second order or curved either way, and not coupled to the rest.
             keep = [k for k in range(len(theta)) if k < self.n + self.m or abs(theta[k]) > 1e-3]
             information = information[np.ix_(keep, keep)]
-        if np.linalg.eigvalsh(information)[0] <= 0:
+        eigenvalues = np.linalg.eigvalsh(information)
+        if eigenvalues[0] <= 1e-10 * eigenvalues[-1]:  # singular but for rounding
             return None
         covariance = np.linalg.inv(information)[:size, :size]
         worth, side, increments, (sd_v, sd_s) = self._split(theta)
