@@ -19,8 +19,9 @@ import pandas as pd
 from scipy import stats
 
 from . import bootstrap, inference, worth
+from .codebook import FRAMING, Codebook
 from .options import FEWEST_PEOPLE, OVERALL, Exclusions, Options
-from .panel import Panel, noted, panels
+from .panel import Panel, by_pair, noted, panels
 from .responses import Responses
 
 PARTICIPANTS = (
@@ -55,11 +56,9 @@ def agreement(responses: Responses, options: Options) -> pd.DataFrame:
     jackknife intervals, one participant left out at a time, with Student's t; side_effect is Wald's.
     """
     rows, notes = [], bootstrap.few(responses)
-    every = panels(responses)
-    for name, panel in every.items():
-        parts = [panel] if name != OVERALL else [one for other, one in every.items() if other != OVERALL]
+    for name, panel in panels(responses).items():
         found = [
-            *_consistency(name, parts, options, notes),
+            *_consistency(name, panel.parts, options, notes),
             *([] if name == OVERALL else _pooled(panel)),
             *_concordance(name, panel, options, notes),
             *_sides(name, panel, options, notes),
@@ -89,7 +88,7 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
     table["side_p"] = np.minimum(1, 2 * stats.binom.cdf(np.minimum(table.left, table.right), decided, 0.5))
     table["same_answer_share"] = given.max(axis=1) / table.answers
 
-    parts = list(panels(responses, overall=False).values())
+    parts = list(panels(responses).values())[-1].parts  # of all framings or levels
     circles, zetas, whole = np.zeros(len(table)), np.zeros(len(table)), np.zeros(len(table), int)
     for panel in parts:
         full = _complete(panel)
@@ -115,7 +114,7 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
         (preference * others).sum(axis=1), length, out=np.full(len(table), np.nan), where=length > 0
     )
     table = table.reset_index().astype({"participant": object})
-    table["excluded"] = _excluded(table, asked.shape[1], options.exclusions)
+    table["excluded"] = _excluded(table, _questions(parts, responses.codebook), options.exclusions)
     table = table[list(PARTICIPANTS)]
     table.attrs["notes"] = (f"declared exclusions: {_rules(options.exclusions)}; they apply in the table of sensitivity alone",)
     return table
@@ -160,7 +159,17 @@ def _conclusions(responses: Responses, options: Options) -> dict[tuple[str, str,
     return found
 
 
-def _excluded(table: pd.DataFrame, questions: int, rules: Exclusions) -> list[str]:
+def _questions(parts: tuple[Panel, ...], codebook: Codebook) -> np.ndarray | int:
+    """How many questions each participant had: all, but for a factor that varies within people, whose levels not everybody need meet."""
+    if codebook.factor == FRAMING:
+        return sum(len(part.first) for part in parts)
+    levels = {part.framing: [one for one in parts if one.framing == part.framing] for part in parts}
+    return sum(
+        np.logical_or.reduce([one.answered.any(axis=1) for one in here]) * sum(len(one.first) for one in here) for here in levels.values()
+    )
+
+
+def _excluded(table: pd.DataFrame, questions: np.ndarray | int, rules: Exclusions) -> list[str]:
     decided = table.left + table.right
     checks = {
         "answered_share": rules.answered_share is not None and table.answers < (rules.answered_share or 0) * questions,
@@ -218,7 +227,7 @@ def zeta(circular: np.ndarray, n: int) -> np.ndarray:
     return 1 - np.asarray(circular) / ((n**3 - n) / 24 if n % 2 else (n**3 - 4 * n) / 24)
 
 
-def _consistency(name: str, parts: list[Panel], options: Options, notes: list[str]) -> list[tuple]:
+def _consistency(name: str, parts: tuple[Panel, ...], options: Options, notes: list[str]) -> list[tuple]:
     labels = ("circular_triads", "zeta", "circular_triads_guessed", "zeta_guessed")
     full = [_complete(panel) for panel in parts]
     people = np.logical_or.reduce(full)
@@ -248,10 +257,11 @@ def _consistency(name: str, parts: list[Panel], options: Options, notes: list[st
 
 def _pooled(panel: Panel) -> list[tuple]:
     n = len(panel.items)
-    if n < 3 or len(panel.first) < n * (n - 1) // 2:
+    counts = by_pair(panel, panel.counts)
+    if n < 3 or not counts.any(axis=1).all():
         return [(label, np.nan, np.nan, np.nan, np.nan) for label in ("pooled_circular_triads", "pooled_zeta")]
-    majority = np.sign(panel.counts[:, 3:].sum(axis=1) - panel.counts[:, :2].sum(axis=1)).astype(np.int8)[None]
-    one = replace(panel, participants=panel.participants[:1], preference=majority, first_left=panel.first_left[:1])
+    majority = np.sign(counts[:, 3:].sum(axis=1) - counts[:, :2].sum(axis=1)).astype(np.int8)[None]
+    one = Panel(panel.framing, panel.items, panel.participants[:1], *np.triu_indices(n, 1), majority, majority == 0)
     circular = triads(one)[0][0]
     return [("pooled_circular_triads", circular, np.nan, np.nan, np.nan), ("pooled_zeta", zeta(circular, n), np.nan, np.nan, np.nan)]
 

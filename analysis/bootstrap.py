@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
 from .options import FEWEST_PEOPLE, Options
-from .panel import Panel, noted, panels
+from .panel import Panel, by_pair, noted, panels
 from .responses import Responses
 
 #: An interval is given where at least this share of the resamples has an estimate.
@@ -98,10 +99,12 @@ def median_intervals(responses: Responses, options: Options) -> pd.DataFrame:
     """framing, a, b, n, median_preference, low, high: the median answer about each pair, -2 to 2, negative prefers a."""
     rows = []
     for name, panel in panels(responses, overall=False).items():
-        n = panel.counts.sum(axis=1).astype(int)
-        low, high = interval(median(counts(panel, options)), panel.people, options.level)
-        for k, (a, b) in enumerate(zip(panel.first, panel.second, strict=True)):
-            rows.append((name, panel.items[a], panel.items[b], n[k], median(panel.counts)[k], low[k], high[k]))
+        given = by_pair(panel, panel.counts)
+        middle = median(given)
+        low, high = interval(median(by_pair(panel, counts(panel, options))), panel.people, options.level)
+        for k, (a, b) in enumerate(combinations(panel.items, 2)):
+            if n := int(given[k].sum()):
+                rows.append((name, a, b, n, middle[k], low[k], high[k]))
     return noted(rows, ["framing", "a", "b", "n", "median_preference", "low", "high"], few(responses))
 
 

@@ -13,6 +13,8 @@ from pathlib import Path
 from .errors import InputError
 
 MANIFEST_FORMAT = "subdermal-manifest/1"
+#: The factor that answers are grouped by when none is chosen.
+FRAMING = "framing"
 #: From near to far. A randomised questionnaire shows them in any order, so that first appearance says nothing.
 KNOWN_FRAMINGS = ("close-up", "head-shot", "half-length")
 #: Levels 1 to 5 of the self-rating, and answers -2 to 2, where the study names none (study.md, 'The questionnaire').
@@ -21,7 +23,10 @@ FAMILIARITY = ("1, no familiarity", "2", "3", "4", "5, high familiarity")
 
 @dataclass(frozen=True)
 class Codebook:
-    """Order and labels of a study's framings and techniques; `order_rule` and `framing_rule` say where the orders come from."""
+    """Order and labels of a study's framings and techniques; `order_rule` and `framing_rule` say where the orders come from.
+
+    factor: the column of the table that answers are grouped by. Where it is not 'framing', `framings` are its levels; see `by`.
+    """
 
     framings: tuple[str, ...]
     techniques: tuple[str, ...]
@@ -30,6 +35,36 @@ class Codebook:
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     familiarity: tuple[str, ...] = FAMILIARITY
     title: str = ""
+    factor: str = FRAMING
+
+    @property
+    def spoken(self) -> str:
+        """The factor in words."""
+        return self.factor.replace("_", " ")
+
+    @property
+    def heading(self) -> str:
+        return self.spoken[:1].upper() + self.spoken[1:]
+
+    @property
+    def level(self) -> str:
+        """What one group of answers is called: 'framing', or 'level of lighting'."""
+        return FRAMING if self.factor == FRAMING else f"level of {self.spoken}"
+
+    @property
+    def levels(self) -> str:
+        return "framings" if self.factor == FRAMING else f"levels of {self.spoken}"
+
+    def counted(self, number: int) -> str:
+        """'3 framings', '1 level of lighting'."""
+        return f"{number} {self.level if number == 1 else self.levels}"
+
+    def by(self, factor: str, levels: Iterable[str], rule: str) -> Codebook:
+        """The same study with the levels of another factor in the place of its framings, labelled 'lighting day'."""
+        levels, spoken = tuple(levels), factor.replace("_", " ")
+        labels = {key: label for key, label in self.labels.items() if key[0] != "framing"}
+        labels |= {("framing", level): f"{spoken} {level}" for level in levels}
+        return replace(self, framings=levels, framing_rule=rule, labels=labels, factor=factor)
 
     @property
     def near_to_far(self) -> bool:

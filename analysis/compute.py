@@ -10,6 +10,9 @@ Numbers that do not exist are empty (NaN), and a note names the reason. Interval
 otherwise they come from a bootstrap over participants (`analysis.bootstrap`). Preferences run from -2 (strong for a) over 0 to
 2 (strong for b). The framing 'overall' holds all framings together, where there are several.
 
+Answers that were read with another factor (`read_responses(..., factor="lighting")`) are grouped by it: every table keeps its columns,
+and `framing` holds the level. The table notes begins with what the levels hold, under the name 'all'.
+
     tallies         framing,technique,score,low,high                                            points, see analysis.tallies
     pair_medians    framing,a,b,n,median_preference,low,high
     ahp_intervals   framing,aggregation,method,technique,priority,low,high                      aggregation median|geometric_mean,
@@ -71,5 +74,5 @@ def everything(responses: Responses, options: Options | None = None) -> Results:
         "familiarity_interaction": inference.familiarity_interaction(responses, options),
     }
     notes = {name: table.attrs.get("notes", ()) for name, table in tables.items()}
-    lines = [(name, line) for name, said in notes.items() for line in said]
+    lines = [("all", line) for line in responses.grouping] + [(name, line) for name, said in notes.items() for line in said]
     return Results(tables | {"notes": pd.DataFrame(lines, columns=["table", "note"])}, notes, options)

@@ -25,7 +25,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from . import tallies
 from .ahp import Priorities
-from .codebook import Codebook
+from .codebook import FRAMING, Codebook
 from .responses import Responses
 
 SIMULATED = "SIMULATED ANSWERS"
@@ -337,7 +337,7 @@ def draw_responses(
     pictures = [
         _picture(
             "scores",
-            "Scores per framing",
+            f"Scores per {codebook.level}",
             "Points of each technique (thesis, figure 5.3): a strong preference gives two, a slight one gives one, "
             "no difference gives none.",
             "; ".join(
@@ -348,7 +348,7 @@ def draw_responses(
             points,
             {name: (codebook.framing_label(name), f"{total[name]}") for name in points},
             labels,
-            "points (total of the framing in brackets)",
+            f"points (total of the {codebook.level} in brackets)",
             0,
             simulated=simulated,
         )
@@ -367,22 +367,22 @@ def draw_responses(
         )
     )
 
-    line = tallies.trend(totals)
+    by_framing = codebook.factor == FRAMING
+    line = tallies.trend(totals) if by_framing else None
+    if line:
+        fitted = ", with the least-squares line; the framings are taken as equally far apart."
+    else:
+        fitted = ". Fewer than three framings: no line is fitted." if by_framing else "; its levels are no distances, and no line is fitted."
     pictures.append(
         _picture(
             "total_by_distance",
-            "Total of points against distance",
-            "Points given at each framing (thesis, figure 5.5)"
-            + (
-                ", with the least-squares line; the framings are taken as equally far apart."
-                if line
-                else ". Fewer than three framings: no line is fitted."
-            ),
+            "Total of points against distance" if by_framing else f"Total of points at each {codebook.level}",
+            f"Points given at each {codebook.level} (thesis, figure 5.5)" + fitted,
             "; ".join(f"{label}: {points}" for label, points in zip(framings, totals.total, strict=True)),
             _total_by_distance,
             totals,
             framings,
-            "framing, from near to far" if codebook.near_to_far else "framing",
+            "framing, from near to far" if codebook.near_to_far else codebook.spoken,
             line,
             simulated=simulated,
         )
@@ -417,7 +417,7 @@ def draw_responses(
         pictures.append(
             _picture(
                 "pair",
-                f"{a} against {b} at each framing",
+                f"{a} against {b} at each {codebook.level}",
                 "Box plot of all answers (thesis, figure 5.7b): box from the lower to the upper quartile, median in orange, "
                 "whiskers to the extremes, one dot an answer.",
                 "; ".join(
@@ -449,7 +449,7 @@ def draw_priorities(
     }
     return _picture(
         "priorities",
-        "AHP priorities per framing",
+        f"AHP priorities per {codebook.level}",
         "Principal eigenvector of the matrix of judgements, scaled to sum 1 (thesis, table 5.2), with the consistency ratio.",
         "; ".join(
             f"{' '.join(titles[framing])}: " + ", ".join(f"{codebook.label(name)} {share:.3f}" for name, share in one.items())
@@ -459,7 +459,7 @@ def draw_priorities(
         shares,
         titles,
         {name: codebook.label(name) for name in used},
-        "priority (sums to 1 within a framing)",
+        f"priority (sums to 1 within a {codebook.level})",
         3,
         simulated=simulated,
     )

@@ -18,6 +18,7 @@ import pandas as pd
 from scipy import stats
 
 from . import bootstrap, tallies, worth
+from .codebook import FRAMING
 from .options import FEWEST_PEOPLE, OVERALL, Options
 from .panel import Panel, by_pair, noted, panels
 from .responses import Responses
@@ -87,7 +88,8 @@ def pairs(responses: Responses, options: Options) -> pd.DataFrame:
             )
     if options.margin is None:
         notes.append("no margin of equivalence was declared: no two techniques are called equivalent")
-    scope = "all pairs of all framings" if options.family == "study" else "the pairs of a framing"
+    codebook = responses.codebook
+    scope = f"all pairs of all {codebook.levels}" if options.family == "study" else f"the pairs of a {codebook.level}"
     notes.append(f"holm_p is Holm's over {scope}, of the {options.test} test; 'overall' is a family of its own")
     table = noted(rows, PAIRS, notes)
     family = (table.framing == OVERALL) if options.family == "study" else table.framing
@@ -174,9 +176,11 @@ def trend(responses: Responses, options: Options) -> pd.DataFrame:
     slope_strength  mean over participants of the slope of their mean strength (0 to 2), a step; p: signed ranks of their slopes, two-sided
     page_l          Page's L that strength falls with every step; p one-sided, normal approximation (Page 1963, doi:10.2307/2282965)
 
-    The last two take those who answered at every framing. Empty with fewer than three framings.
+    The last two take those who answered at every framing. Empty with fewer than three framings, and for the levels of another factor.
     """
     columns = ["statistic", "value", "low", "high", "p"]
+    if responses.codebook.factor != FRAMING:
+        return noted([], columns, [f"{responses.codebook.levels} are no distances: no trend"])
     here = list(panels(responses, overall=False).values())
     if len(here) < 3:
         return noted([], columns, [f"{len(here)} framings: a trend over distance needs 3"])

@@ -6,6 +6,7 @@ import platform
 from collections.abc import Mapping
 from importlib import metadata
 
+from .codebook import FRAMING
 from .conclusions import count
 from .options import Options
 from .responses import Responses
@@ -65,6 +66,7 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
     frame, alpha = responses.frame, alpha_of(options)
     kind = "SIMULATED participants (programs, not people)" if responses.simulated else "participants"
     pairs = sum(len(items) * (len(items) - 1) // 2 for items in responses.items.values())
+    codebook = responses.codebook
     asked = len(frame[["framing", "a", "b"]].drop_duplicates())
     present = {name for items in responses.items.values() for name in items}
     names = ", ".join(responses.codebook.label(name) for name in responses.codebook.techniques if name in present)
@@ -73,12 +75,13 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
     found = [
         (
             "Answers",
-            f"{responses.participants} {kind} compared images in pairs: {names}; at {count(len(responses.items), 'framing')} "
+            f"{responses.participants} {kind} compared images in pairs: {names}; at {codebook.counted(len(responses.items))} "
             f"({', '.join(responses.codebook.framing_label(name) for name in responses.items)}), {asked} of {pairs} pairs in all. They "
             "answered on a scale from \N{MINUS SIGN}2 (strong preference for the left image) over 0 (no difference seen) to 2 (strong "
             f"preference for the right one). {len(frame)} answers were analysed; {rows}. "
             "Sides and order were as the table gives them; answers were turned to the pair before anything was computed.",
         ),
+        *([("Grouping", " ".join(responses.grouping))] if responses.grouping else []),
         (
             "Scores and priorities",
             "A strong preference gives two points, a slight one gives one. For the Analytic Hierarchy Process [saaty1980] the answers 0, 1 "
@@ -88,7 +91,7 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
         ),
         (
             "Worths",
-            "Worths, centred on 0 within a framing, were estimated in four models: Bradley-Terry [bradley1952] and Thurstone's case V "
+            f"Worths, centred on 0 within a {codebook.level}, were estimated in four models: Bradley-Terry [bradley1952] and Thurstone's case V "
             "[thurstone1927] in just-objectionable differences (1 JOD: 75 % prefer one of the two) [perezortiz2017], with 'no difference' "
             + ("as half a preference each way" if options.ties == "half" else "left out")
             + "; Davidson's model, in which ties are an outcome of their own [davidson1970]; and a cumulative-logit model of all five answers "
@@ -109,7 +112,7 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             "mean ranks, exact up to 50 people with a preference, then the normal approximation with ties corrected and no continuity "
             "correction) and by the exact two-sided sign test. The declared test is the "
             f"{'Wilcoxon test' if options.test == 'wilcoxon' else 'sign test'}, corrected by Holm's procedure [holm1979] over the pairs of "
-            f"{'all framings together' if options.family == 'study' else 'each framing'}, at {alpha:g}. Effect sizes are the matched-pairs "
+            f"{f'all {codebook.levels} together' if options.family == 'study' else f'each {codebook.level}'}, at {alpha:g}. Effect sizes are the matched-pairs "
             "rank-biserial correlation [kerby2014] and the standardised mean difference.",
         ),
         ("Equivalence", _equivalence(options, alpha, declared)),
@@ -117,8 +120,13 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             "Agreement and quality",
             "Consistency is by circular triads and zeta [kendall1940], agreement by Kendall's u [kendall1940] (chi-square test where everyone "
             "answered every pair without ties; else by flipping decided answers) and Krippendorff's ordinal alpha [krippendorff2013], all on "
-            "answers turned to the pair. The trend over framings is the slope of each person's mean strength of preference, and Page's L "
-            "[page1963]. Familiarity was set against each person's preference for a technique by Spearman's correlation, Holm-corrected.",
+            "answers turned to the pair. "
+            + (
+                "The trend over framings is the slope of each person's mean strength of preference, and Page's L [page1963]. "
+                if codebook.factor == FRAMING
+                else ""
+            )
+            + "Familiarity was set against each person's preference for a technique by Spearman's correlation, Holm-corrected.",
         ),
         (
             "Exclusions",

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
+from .codebook import FRAMING
 from .errors import InputError
 from .options import OVERALL
-from .responses import Responses
+from .responses import Responses, questions
 
 #: In `Panel.preference`, where a participant was not asked.
 MISSING = -128
@@ -21,14 +22,16 @@ PREFERENCES = np.arange(-2, 3)
 
 @dataclass(frozen=True)
 class Panel:
-    """One framing, or all framings together.
+    """One framing, or level of another factor, or all of them together.
 
     framing       its name, or 'overall'
     items         (n,) the techniques that have answers here, in the order of the codebook
-    participants  (P,) the names of all participants of the study; the rows are the same in every panel
-    first, second (K,) int: the pair of each question as indices into items, first < second; 'overall' has a pair once a framing
+    participants  (P,) the names of all participants of the study, the same rows in every panel; at a level of another factor than
+                  'framing' of those who answered there
+    first, second (K,) int: the pair of each question as indices into items, first < second; a pair comes once a framing
     preference    (P, K) int8: -2 strong for first ... 2 strong for second, MISSING where not answered
     first_left    (P, K) bool: first was shown on the left
+    joined        the panels that this one puts side by side, none where a pair comes once
     """
 
     framing: str
@@ -38,6 +41,12 @@ class Panel:
     second: np.ndarray
     preference: np.ndarray
     first_left: np.ndarray
+    joined: tuple[Panel, ...] = ()
+
+    @property
+    def parts(self) -> tuple[Panel, ...]:
+        """Panels with the same rows in which a pair comes once."""
+        return self.joined or (self,)
 
     @cached_property
     def answered(self) -> np.ndarray:
@@ -74,6 +83,7 @@ class Panel:
             self.second,
             self.preference[rows],
             self.first_left[rows],
+            tuple(part.chosen(rows) for part in self.joined),
         )
 
 
@@ -86,40 +96,57 @@ def panels(responses: Responses, overall: bool = True) -> dict[str, Panel]:
 
 
 def _panels(responses: Responses) -> dict[str, Panel]:
+    frame, factor = responses.frame, responses.codebook.factor
     if OVERALL in responses.items:
-        raise InputError(f"a framing is called {OVERALL!r}, the name of all framings together; expected another name")
-    frame = responses.frame
+        level, levels = responses.codebook.level, responses.codebook.levels
+        raise InputError(f"a {level} is called {OVERALL!r}, the name of all {levels} together; expected another name")
     names = frame.participant.cat.categories.to_numpy()
-    rows = frame.participant.cat.codes.to_numpy()
-    a, b = frame.a.cat.codes.to_numpy().astype(int), frame.b.cat.codes.to_numpy().astype(int)
-    place = {name: index for index, name in enumerate(responses.codebook.techniques)}
-    result = {}
-    for framing, items in responses.items.items():
-        here = (frame.framing == framing).to_numpy()
-        result[framing] = _panel(framing, items, place, names, rows[here], a[here], b[here], frame[here])
+    rows, level, image, a, b = (frame[name].cat.codes.to_numpy() for name in ("participant", "framing", "image_framing", "a", "b"))
+    techniques = responses.codebook.techniques
+
+    def asked(name: str, here: np.ndarray) -> Panel:
+        return _panel(name, techniques, names, rows[here], a[here].astype(int), b[here].astype(int), frame[here])
+
+    parts = {
+        name: [asked(name, (level == place) & (image == one)) for one in np.unique(image[level == place])]
+        for place, name in enumerate(responses.codebook.framings)
+        if name in responses.items
+    }
+    result = {name: _joined(name, techniques, here) for name, here in parts.items()}
+    if factor != FRAMING:
+        result = {name: panel.chosen(panel.answered.any(axis=1)) for name, panel in result.items()}
     if len(result) > 1:
-        seen = {name for items in responses.items.values() for name in items}
-        items = tuple(name for name in responses.codebook.techniques if name in seen)
-        first, second = (
-            np.concatenate([[items.index(one.items[at]) for at in getattr(one, side)] for one in result.values()])
-            for side in ("first", "second")
-        )
-        preference = np.concatenate([one.preference for one in result.values()], axis=1)
-        left = np.concatenate([one.first_left for one in result.values()], axis=1)
-        result[OVERALL] = Panel(OVERALL, items, names, first, second, preference, left)
+        every = [part for here in parts.values() for part in here]
+        if factor != FRAMING and "framing" not in questions(frame, responses.codebook):
+            every = [asked(OVERALL, image == one) for one in np.unique(image)]
+        result[OVERALL] = _joined(OVERALL, techniques, every)
     return result
 
 
-def _panel(framing, items, place, names, rows, a, b, frame: pd.DataFrame) -> Panel:
-    width = max(place.values()) + 1
-    keys, column = np.unique(a * width + b, return_inverse=True)
-    index = np.full(width, -1)
-    index[[place[name] for name in items]] = range(len(items))
+def _panel(name, techniques, names, rows, a, b, frame: pd.DataFrame) -> Panel:
+    keys, column = np.unique(a * len(techniques) + b, return_inverse=True)
+    first, second = np.divmod(keys, len(techniques))
+    seen = np.union1d(first, second)
     preference = np.full((len(names), len(keys)), MISSING, np.int8)
     left = np.zeros((len(names), len(keys)), bool)
     preference[rows, column] = frame.preference.to_numpy()
     left[rows, column] = frame.a_left.to_numpy()
-    return Panel(framing, items, names, index[keys // width], index[keys % width], preference, left)
+    items = tuple(techniques[place] for place in seen)
+    return Panel(name, items, names, np.searchsorted(seen, first), np.searchsorted(seen, second), preference, left)
+
+
+def _joined(name: str, techniques: tuple[str, ...], parts: list[Panel]) -> Panel:
+    """The questions of all parts side by side."""
+    if len(parts) == 1:
+        return replace(parts[0], framing=name)
+    seen = {item for part in parts for item in part.items}
+    items = tuple(item for item in techniques if item in seen)
+    first, second = (
+        np.concatenate([[items.index(part.items[at]) for at in getattr(part, side)] for part in parts]) for side in ("first", "second")
+    )
+    preference = np.concatenate([part.preference for part in parts], axis=1)
+    left = np.concatenate([part.first_left for part in parts], axis=1)
+    return Panel(name, items, parts[0].participants, first, second, preference, left, tuple(parts))
 
 
 def wins(panel: Panel, counts: np.ndarray, ties: str = "half") -> np.ndarray:

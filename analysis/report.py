@@ -19,7 +19,7 @@ import pandas as pd
 
 from . import ahp, compute, conclusions, figures, latex, methods, objective, shown, tallies, worth_figures
 from .ahp import Comparison, Priorities
-from .codebook import Codebook
+from .codebook import FRAMING, Codebook
 from .conclusions import count as _count
 from .conclusions import listed as _listed
 from .declared import UNDECLARED
@@ -72,7 +72,9 @@ def report_responses(
     } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
     results = compute.everything(responses, options)
     tables |= results.tables
-    beside, correlated = None, None
+    beside, correlated, unmeasured = None, None, ()
+    if measured is not None and codebook.factor != FRAMING:
+        measured, unmeasured = None, (f"Cost and fidelity are measured per framing and are not set beside worths by {codebook.spoken}.",)
     if measured is not None:
         beside = objective.against_worth(measured.table, results.tables["worths"])
         correlated = objective.correlations(beside)
@@ -82,7 +84,7 @@ def report_responses(
 
     simulated, alpha = responses.simulated, shown.alpha_of(options)
     pictures = worth_figures.draw_results(results.tables, codebook, options.margin, alpha, simulated)
-    said = []
+    said = list(unmeasured)
     if measured is not None:
         for measure, rows in beside.groupby("measure", sort=False):
             about = objective.MEASURES[measure]
@@ -129,7 +131,7 @@ def report_responses(
             ("participant", responses.participants),
             ("answer", len(responses.frame)),
             ("technique", len({name for items in responses.items.values() for name in items})),
-            ("framing", len(responses.items)),
+            ("framing" if codebook.factor == FRAMING else "level", len(responses.items)),
             ("unused row", len(responses.findings)),
         ],
         scores=_crossed(scores, "score", codebook, list(responses.items)),
@@ -144,6 +146,7 @@ def report_responses(
         order_rule=codebook.order_rule,
         framings=[codebook.framing_label(name) for name in codebook.framings],
         framing_rule=codebook.framing_rule,
+        codebook=codebook,
         notes=responses.notes,
         findings=responses.findings[:SHOWN_ROWS],
         rows=responses.rows,
@@ -189,6 +192,7 @@ def report_matrices(comparisons: Mapping[str, Comparison], source: str = "", com
         order_rule=codebook.order_rule,
         framings=list(comparisons),
         framing_rule=codebook.framing_rule,
+        codebook=codebook,
         source=source,
         command=command,
     )
@@ -331,7 +335,7 @@ def _summary(
     people = _count(responses.participants, "simulated participant" if responses.simulated else "participant")
     unused = f"{_count(len(responses.findings), 'row')} of the table could not be used; see below."
     sentences.append(
-        f"{people} gave {_count(len(frame), 'answer')} at {_count(len(responses.items), 'framing')}. "
+        f"{people} gave {_count(len(frame), 'answer')} at {codebook.counted(len(responses.items))}. "
         + (unused if responses.findings else "Every row of the table is counted.")
     )
     for framing, rows in scores.groupby("framing", sort=False):
@@ -368,7 +372,8 @@ def _summary(
             f"{row.mean_strength:.2f} ({codebook.framing_label(row.framing)})" for row in totals.itertuples()
         )
         path = "From near to far" if codebook.near_to_far else "From framing to framing"
-        sentences.append(f"{path}, preferences {way}: on average an answer gave {values} points, of at most 2.")
+        path = f"{path}, preferences {way}: on" if codebook.factor == FRAMING else "On"
+        sentences.append(f"{path} average an answer gave {values} points, of at most 2.")
     a, b = (codebook.label(name) for name in pair)
     values = "; ".join(
         f"{codebook.framing_label(framing)} {(one < 0).sum()}, {(one == 0).sum()} and {(one > 0).sum()}"

@@ -17,12 +17,17 @@ import numpy as np
 import pandas as pd
 
 from . import codebook as codebooks
-from .codebook import Codebook
+from .codebook import FRAMING, Codebook
 from .errors import InputError
+from .options import FEWEST_PEOPLE
 
 REQUIRED = ("participant", "familiarity", "framing", "left", "right", "answer", "order", "rt_ms", "started_at")
 OPTIONAL = ("simulated", "study", "study_version")
 REPEATS = ("participant", "framing", "a", "b", "preference", "first_preference")
+#: Columns of an answer that no answers can be grouped by.
+NO_FACTOR = ("participant", "left", "right", "answer", "order", "rt_ms", "started_at")
+#: So many levels a factor may have; and a factor of numbers, beyond which it is a measurement and no group.
+MOST_LEVELS, MOST_NUMBERS = 30, 10
 
 _INTEGER = r"[+-]?[0-9]{1,9}(?:\.0*)?"
 _NUMBER = r"\+?[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,2})?"
@@ -50,7 +55,8 @@ class Responses:
     frame has one row an answer:
         participant     category
         familiarity     int8, 1 to 5
-        framing         ordered category, in the order of the codebook
+        framing         ordered category, in the order of the codebook; with another factor than 'framing', its level
+        image_framing   ordered category: the framing of the images, whatever the factor
         a, b            ordered categories: the pair, a before b in the order of techniques
         preference      int8, -2 to 2, oriented to the pair: negative prefers a, positive prefers b
         strength        int8, 0 to 2: |preference|
@@ -61,6 +67,8 @@ class Responses:
         rt_ms           float64, milliseconds
         started_at      datetime, UTC
         line            int64, where the row begins in the file
+
+    grouping says, where the factor is not 'framing', what its levels hold; notes begin with it.
 
     repeats has one row for each question that a participant was asked again (the same pair under another `order`; it is not counted):
         participant, framing, a, b, preference (the later answer), first_preference (the one that counts)
@@ -74,6 +82,7 @@ class Responses:
     rows: int = 0
     source: str = ""
     sha256: str = ""
+    grouping: tuple[str, ...] = ()
     repeats: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=REPEATS))
 
     @cached_property
@@ -93,38 +102,58 @@ class Responses:
 
 
 def read_responses(
-    path: str | Path, codebook: Codebook | None = None, order: Iterable[str] | None = None
+    path: str | Path, codebook: Codebook | None = None, order: Iterable[str] | None = None, factor: str = FRAMING
 ) -> Responses:
     """Read responses.csv (UTF-8 with or without BOM, comma separated). See `Responses` for what comes out.
 
     codebook: the study's (`codebook.read_manifest`); without it names, labels and order come from the table.
     order: every technique once; overrides the order of the codebook.
+    factor: the column that answers are grouped by, everywhere that a framing is meant without it: every table keeps its columns, and
+        `framing` holds the factor's level. Which answers are duplicates depends on it: one pair at one framing counts once a level.
     """
+    _allowed(factor)
     path = Path(path)
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    raw, lines, findings = _parse(str(path), data)
-    return _tidy(str(path), raw, lines, findings, codebook, order, hashlib.sha256(data).hexdigest())
+    raw, lines, findings = _parse(str(path), data, factor)
+    return _tidy(str(path), raw, lines, findings, codebook, order, factor, hashlib.sha256(data).hexdigest())
 
 
 def responses_from_records(
-    records: Iterable[Mapping[str, object]], codebook: Codebook | None = None, order: Iterable[str] | None = None
+    records: Iterable[Mapping[str, object]],
+    codebook: Codebook | None = None,
+    order: Iterable[str] | None = None,
+    factor: str = FRAMING,
 ) -> Responses:
     """The same from mappings with the columns of responses.csv, for answers that are not in a file; lines count from 1."""
+    _allowed(factor)
     raw = pd.DataFrame.from_records(list(records))
     missing = [name for name in REQUIRED if name not in raw]
     if missing:
         raise InputError(f"the records lack {', '.join(missing)}; expected {', '.join(REQUIRED)}")
-    raw = raw[[name for name in (*REQUIRED, *OPTIONAL) if name in raw]]
+    if factor not in raw:
+        raise InputError(_lacking(factor, raw))
+    blank = raw[factor].isna() & (factor not in REQUIRED)
+    raw = raw[[name for name in dict.fromkeys((*REQUIRED, *OPTIONAL, factor)) if name in raw]]
     raw = raw.map(lambda value: str(int(value)) if isinstance(value, bool) else str(value)).astype(object)
+    raw["level"] = raw[factor].str.strip().mask(blank, "")
     raw["line"] = raw["last_line"] = np.arange(1, len(raw) + 1)
     lines = [",".join(values) for values in raw[list(REQUIRED)].to_numpy()]
-    return _tidy("the records", raw, lines, [], codebook, order, "")
+    return _tidy("the records", raw, lines, [], codebook, order, factor, "")
 
 
-def _parse(name: str, data: bytes) -> tuple[pd.DataFrame, list[str], list[Finding]]:
+def _allowed(factor: str) -> None:
+    if factor in NO_FACTOR:
+        raise InputError(f"the factor is {factor!r}, which no answers can be grouped by; expected a column like framing or familiarity")
+
+
+def _lacking(factor: str, columns: Iterable[str]) -> str:
+    return f"has no column {factor!r} to group answers by; expected one of {', '.join(name for name in columns if name not in NO_FACTOR)}"
+
+
+def _parse(name: str, data: bytes, factor: str) -> tuple[pd.DataFrame, list[str], list[Finding]]:
     """The cells as text, with line and last_line; the lines of the file; findings for rows without the header's fields."""
     try:
         text = data.decode("utf-8-sig")
@@ -145,7 +174,9 @@ def _parse(name: str, data: bytes) -> tuple[pd.DataFrame, list[str], list[Findin
     if missing:
         hint = next((f"; is it separated by {mark!r}?" for mark in ";\t" if mark in lines[0]), "")
         raise InputError(f"{name}: has no column {', '.join(missing)}{hint}; expected {','.join(REQUIRED)}")
-    wanted = [column for column in (*REQUIRED, *OPTIONAL) if column in header]
+    if factor not in header:
+        raise InputError(f"{name}: {_lacking(factor, header)}")
+    wanted = [column for column in dict.fromkeys((*REQUIRED, *OPTIONAL, factor)) if column in header]
     twice = [column for column in wanted if header.count(column) > 1]
     if twice:
         raise InputError(f"{name}: has the column {', '.join(twice)} twice")
@@ -175,6 +206,7 @@ def _parse(name: str, data: bytes) -> tuple[pd.DataFrame, list[str], list[Findin
     if not cells and not findings:
         raise InputError(f"{name}: has a header and no rows, expected one row an answer")
     raw = pd.DataFrame(cells, columns=wanted, dtype=object)
+    raw["level"] = raw[factor]
     raw["line"], raw["last_line"] = np.array(spans, dtype=np.int64).reshape(-1, 2).T
     return raw, lines, findings
 
@@ -190,10 +222,11 @@ def _tidy(
     findings: list[Finding],
     codebook: Codebook | None,
     order: Iterable[str] | None,
+    factor: str,
     sha256: str,
 ) -> Responses:
     rows = len(raw) + len(findings)
-    values, reasons = _checked(raw, codebook)
+    values, reasons = _checked(raw, codebook, factor)
     simulated = _one_kind(name, raw)
     findings = findings + [
         _finding(raw.line[at], raw.last_line[at], "malformed", _some(reasons[at], 3, "; "), lines) for at in sorted(reasons)
@@ -210,7 +243,13 @@ def _tidy(
         codebook = codebook.ordered(order, [name for name in codebook.techniques if name in present])
 
     frame = _oriented(frame, codebook)
-    key = ["participant", "framing", "a", "b"]
+    if factor != FRAMING:
+        level = raw.level.drop(index=list(reasons))
+        if factor == "familiarity":
+            level = frame.groupby("participant", observed=True).familiarity.transform("first").astype(str)
+        codebook = codebook.by(factor, *_levels(name, factor, level))
+        frame["framing"] = pd.Categorical(level, codebook.framings, ordered=True)
+    key = ["participant", "framing", "image_framing", "a", "b"]
     again = frame.duplicated(key)
     asked_again = {}
     if again.any():
@@ -223,7 +262,7 @@ def _tidy(
                 row.line,
                 row.last_line,
                 "duplicate",
-                f"{row.participant!r} answered {row.framing}, {row.a} against {row.b}, on line {row.first} already, "
+                f"{row.participant!r} answered {_where(row, codebook)}, {row.a} against {row.b}, on line {row.first} already, "
                 "which is the one that counts",
                 lines,
             )
@@ -231,11 +270,13 @@ def _tidy(
         ]
         frame = frame[~again]
     frame = frame.drop(columns="last_line").reset_index(drop=True)
+    grouping = () if factor == FRAMING else tuple(_grouping(frame, codebook))
     return Responses(
         frame=frame,
         codebook=codebook,
         findings=tuple(sorted(findings, key=lambda finding: finding.line)),
-        notes=tuple(_notes(frame, raw, codebook)),
+        notes=(*grouping, *_notes(frame, raw, codebook)),
+        grouping=grouping,
         simulated=simulated,
         rows=rows,
         source=Path(name).name,
@@ -244,7 +285,61 @@ def _tidy(
     )
 
 
-def _checked(raw: pd.DataFrame, codebook: Codebook | None) -> tuple[pd.DataFrame, dict[int, list[str]]]:
+def questions(frame: pd.DataFrame, codebook: Codebook) -> list[str]:
+    """The columns that tell one question from another: the factor's level is one where somebody answered the same images at several."""
+    key = ["image_framing", "a", "b"]
+    within = codebook.factor != FRAMING and frame.duplicated(["participant", *key]).any()
+    return ["framing", *key] if within else key
+
+
+def _levels(name: str, factor: str, level: pd.Series) -> tuple[list[str], str]:
+    """The levels of a factor in order, and the rule of the order; refuses a column that is no factor."""
+    levels = list(pd.unique(level))
+    numbers = pd.to_numeric(pd.Series(levels), errors="coerce")
+    numeric = bool(np.isfinite(numbers).all())
+    most = MOST_NUMBERS if numeric else MOST_LEVELS
+    if len(levels) > most:
+        got = f"{len(levels)} numbers from {numbers.min():g} to {numbers.max():g}" if numeric else f"{len(levels)} levels"
+        raise InputError(
+            f"{name}: the factor {factor!r} has {got}, expected at most {most}; put them into a few groups in a column of their own"
+        )
+    if not numeric:
+        return levels, "first appearance in the table"
+    return [levels[place] for place in np.argsort(numbers.to_numpy(), kind="stable")], "from the lowest number to the highest"
+
+
+def _where(row: object, codebook: Codebook) -> str:
+    return row.framing if codebook.factor == FRAMING else f"{codebook.framing_label(row.framing)}, {row.image_framing}"
+
+
+def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
+    """What the levels of a factor hold, and how what they hold is taken."""
+    held = frame.groupby("framing", observed=True).agg(people=("participant", "nunique"), answers=("answer", "size"))
+    sizes = "; ".join(f"{codebook.framing_label(level)}: {row.people} participants, {row.answers} answers" for level, row in held.iterrows())
+    yield f"Answers are grouped by {codebook.spoken} ({sizes}); the column framing of every table holds its levels."
+    if len(held) == 1:
+        yield f"There is one {codebook.level}: nothing is compared over it."
+    few = [codebook.framing_label(level) for level in held.index[held.people < FEWEST_PEOPLE]]
+    if few:
+        yield f"{_some(few)}: fewer than {FEWEST_PEOPLE} participants, and so no intervals and no tests."
+    here = frame.drop_duplicates(["framing", "image_framing"]).groupby("framing", observed=True).image_framing
+    several = here.nunique()
+    if (several > 1).any():
+        where = [codebook.framing_label(level) for level in several.index[several > 1]]
+        names = [name for name in frame.image_framing.cat.categories if (frame.image_framing == name).any()]
+        yield (
+            f"{'Every ' + codebook.level if len(where) == len(held) else _some(where)} pools framings ({_some(names)}). Answers of one "
+            "participant about one pair at several framings are repeated measures: tests take the participant's mean, and intervals "
+            "resample participants with all of their answers; counts, medians, worths and AHP take every answer."
+        )
+    if len(held) > 1 and "framing" not in questions(frame, codebook):
+        yield (
+            f"Nobody judged the same images at several {codebook.levels}: taken together, the answers are those of the study without "
+            "this grouping."
+        )
+
+
+def _checked(raw: pd.DataFrame, codebook: Codebook | None, factor: str) -> tuple[pd.DataFrame, dict[int, list[str]]]:
     """The numeric columns as numbers, and for each row that fails, by its position, why."""
     values = pd.DataFrame(index=raw.index)
     for column, pattern in (("familiarity", _INTEGER), ("answer", _INTEGER), ("order", _INTEGER), ("rt_ms", _NUMBER)):
@@ -259,6 +354,8 @@ def _checked(raw: pd.DataFrame, codebook: Codebook | None) -> tuple[pd.DataFrame
         ("rt_ms", ~np.isfinite(values.rt_ms), "milliseconds, a number from 0"),
         ("started_at", values.started_at.isna(), "a time in ISO 8601"),
     ]
+    if factor not in REQUIRED:
+        checks.append(("level", raw.level == "", "a level to group answers by"))
     if "simulated" in raw:
         checks.append(("simulated", ~raw.simulated.isin(["0", "1"]), "0 or 1"))
     if codebook is not None:
@@ -273,7 +370,7 @@ def _checked(raw: pd.DataFrame, codebook: Codebook | None) -> tuple[pd.DataFrame
     reasons: dict[int, list[str]] = {}
     for column, bad, expected in checks:
         for at in np.flatnonzero(bad):
-            reasons.setdefault(at, []).append(f"{column} is {raw[column][at]!r:.60}, expected {expected}")
+            reasons.setdefault(at, []).append(f"{factor if column == 'level' else column} is {raw[column][at]!r:.60}, expected {expected}")
     for at in np.flatnonzero((raw.left == raw.right) & (raw.left != "")):
         reasons.setdefault(at, []).append(f"left and right are both {raw.left[at]!r:.60}, expected two techniques")
     return values, reasons
@@ -305,6 +402,7 @@ def _oriented(frame: pd.DataFrame, codebook: Codebook) -> pd.DataFrame:
             "participant": frame.participant.astype("category"),
             "familiarity": frame.familiarity.astype(np.int8),
             "framing": pd.Categorical(frame.framing, codebook.framings, ordered=True),
+            "image_framing": pd.Categorical(frame.framing, codebook.framings, ordered=True),
             "a": pd.Categorical.from_codes(a, dtype=techniques),
             "b": pd.Categorical.from_codes(b, dtype=techniques),
             "preference": preference,
@@ -328,11 +426,11 @@ def _notes(frame: pd.DataFrame, raw: pd.DataFrame, codebook: Codebook) -> Iterab
     unsure = list(levels.index[levels > 1])
     if unsure:
         yield f"{_some(unsure)} rated their familiarity in more than one way; the first rating is used."
-    questions = len(frame[["framing", "a", "b"]].drop_duplicates())
+    asked = len(frame[questions(frame, codebook)].drop_duplicates())
     answers = frame.participant.value_counts()
-    short = sorted(answers.index[answers < questions])
+    short = sorted(answers.index[answers < asked])
     if short:
-        yield f"{_some(short)} answered fewer than the {questions} questions in the table; what they answered is counted."
+        yield f"{_some(short)} answered fewer than the {asked} questions in the table; what they answered is counted."
     for column in ("study", "study_version"):
         if column in raw:
             several = sorted(raw[column].unique())

@@ -84,8 +84,8 @@ def worths(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
             rows.append((framing_label(codebook, framing), codebook.label(technique), *values))
     return Shown(
         "worths",
-        f"Worths, centred on 0 within a framing, with {100 * options.level:g} % intervals",
-        ("Framing", "Technique", *(f"{MODELS[model][0]} ({MODELS[model][1]})" for model in models)),
+        f"Worths, centred on 0 within a {codebook.level}, with {100 * options.level:g} % intervals",
+        (codebook.heading, "Technique", *(f"{MODELS[model][0]} ({MODELS[model][1]})" for model in models)),
         (False, False, *[True] * len(models)),
         tuple(rows),
         "Intervals by resampling participants, those of the ordinal model by Wald from its information.",
@@ -117,13 +117,13 @@ def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
         "pairs",
         "Every pair: answers, tests and what they come to",
         (
-            "Framing", "A", "B", "n", "Answers", "Mean preference for B", "Wilcoxon p", "Sign p", "Holm p", "TOST p",
+            codebook.heading, "A", "B", "n", "Answers", "Mean preference for B", "Wilcoxon p", "Sign p", "Holm p", "TOST p",
             "TOST Holm p", "Rank-biserial", "JOD, B less A", "Verdict",
         ),
         (False, False, False, *[True] * 10, False),
         tuple(rows),
         "Answers: strong for A / slight for A / no difference / slight for B / strong for B. Positive numbers favour B. "
-        f"Holm's correction is of the {_test(options)} and of the two one-sided tests (TOST), over the pairs of {_family(options)}; "
+        f"Holm's correction is of the {_test(options)} and of the two one-sided tests (TOST), over the pairs of {_family(options, codebook)}; "
         f"the verdict is at {alpha:g}.",
     )  # fmt: skip
 
@@ -142,7 +142,7 @@ def agreement(table: pd.DataFrame, codebook: Codebook) -> Shown:
     return Shown(
         "agreement",
         "Agreement and quality",
-        ("Framing", "Statistic", "Value", "p"),
+        (codebook.heading, "Statistic", "Value", "p"),
         (False, False, True, True),
         tuple(rows),
     )
@@ -164,7 +164,7 @@ def priorities(table: pd.DataFrame, codebook: Codebook) -> Shown:
     return Shown(
         "ahp_intervals",
         "AHP priorities by how people are put together and how priorities are found",
-        ("Framing", "Technique", *(f"{names.get(one, one)}, {names.get(other, other)}" for one, other in kinds)),
+        (codebook.heading, "Technique", *(f"{names.get(one, one)}, {names.get(other, other)}" for one, other in kinds)),
         (False, False, *[True] * len(kinds)),
         tuple(rows),
         "Row mean: geometric mean of the rows. Intervals by resampling participants.",
@@ -188,7 +188,7 @@ def consistency(table: pd.DataFrame, codebook: Codebook) -> Shown:
     return Shown(
         "ahp_consistency",
         "Consistency of the AHP matrices, and the judgement to look at again",
-        ("Framing", "People by", "CI", "CR", "Look again at", "Judgement", "The others imply"),
+        (codebook.heading, "People by", "CI", "CR", "Look again at", "Judgement", "The others imply"),
         (False, False, True, True, False, True, True),
         tuple(rows),
     )
@@ -225,7 +225,7 @@ def familiarity(table: pd.DataFrame, codebook: Codebook) -> Shown:
     return Shown(
         "familiarity_interaction",
         "Does familiarity change preference?",
-        ("Framing", "Technique", "n", "Slope a level", "Spearman", "p", "Holm p", "Found with power 0.8 from"),
+        (codebook.heading, "Technique", "n", "Slope a level", "Spearman", "p", "Holm p", "Found with power 0.8 from"),
         (False, False, *[True] * 6),
         tuple(rows),
         "Slope: change of a technique's mean preference for each level of familiarity. The last column is the smallest correlation "
@@ -248,7 +248,7 @@ def sensitivity(table: pd.DataFrame, codebook: Codebook) -> Shown:
     return Shown(
         "sensitivity",
         "Conclusions that change without the excluded participants",
-        ("Framing", "Conclusion", "Pair", "With everyone", "Without the excluded"),
+        (codebook.heading, "Conclusion", "Pair", "With everyone", "Without the excluded"),
         (False,) * 5,
         tuple(rows),
     )
@@ -289,5 +289,5 @@ def _test(options: Options) -> str:
     return {"wilcoxon": "Wilcoxon test", "sign": "sign test"}[options.test]
 
 
-def _family(options: Options) -> str:
-    return {"study": "all framings together", "framing": "each framing"}[options.family]
+def _family(options: Options, codebook: Codebook) -> str:
+    return {"study": f"all {codebook.levels} together", "framing": f"each {codebook.level}"}[options.family]

@@ -45,7 +45,7 @@ DRAWN = {
 
 
 def framing_label(codebook: Codebook, name: str) -> str:
-    return "All framings" if name == OVERALL else codebook.framing_label(name)
+    return f"All {codebook.levels}" if name == OVERALL else codebook.framing_label(name)
 
 
 def verdict(row: object, alpha: float) -> str:
@@ -85,7 +85,7 @@ def draw_worths(worths: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
     return figures._picture(
         "worths",
         "Worths with their intervals",
-        "Each technique's worth in four models, centred on 0 within a framing; lines are intervals: over resampled "
+        "Each technique's worth in four models, centred on 0 within a " + codebook.level + "; lines are intervals: over resampled "
         "participants, for the ordinal model by Wald. Models have units of their own: compare the order and the gaps against the intervals, not the numbers.",
         "; ".join(
             f"{framing_label(codebook, framing)}, {MODELS.get(model, (model, ''))[0]}: "
@@ -148,7 +148,7 @@ def draw_ladder(worths: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
         "jod_ladder",
         "The JOD ladder",
         "Thurstone case V worths in just-objectionable differences: of two techniques 1 JOD apart, three of four answers prefer the "
-        "upper one. Bars are intervals over resampled participants; 0 is the mean of the framing.",
+        "upper one. Bars are intervals over resampled participants; 0 is the mean of the " + codebook.level + ".",
         "; ".join(
             f"{framing_label(codebook, framing)}: "
             + ", ".join(f"{codebook.label(row.technique)} {row.estimate:z.2f} JOD" for row in rows.itertuples())

@@ -48,6 +48,11 @@ def names(ctx: click.Context, parameter: click.Parameter, value: str | None) -> 
     help="Instead of RESPONSES: `items = [names]` and for each framing `[matrix.NAME]` with `rows = [[1, 0.5, ...], ...]`.",
 )
 @click.option(
+    "--factor",
+    metavar="COLUMN",
+    help="Group the answers by this column of RESPONSES, such as lighting or familiarity. Without it by framing.",
+)
+@click.option(
     "--reference",
     default="reference",
     show_default=True,
@@ -67,6 +72,7 @@ def command(
     pair: tuple[str, str] | None,
     study: Path | None,
     matrices: Path | None,
+    factor: str | None,
     reference: str,
     **choices: object,
 ) -> None:
@@ -76,7 +82,7 @@ def command(
     """
     from analysis import declared as declarations
     from analysis.ahp import read_matrices
-    from analysis.codebook import is_manifest, read_manifest
+    from analysis.codebook import FRAMING, is_manifest, read_manifest
     from analysis.objective import read_measures
     from analysis.report import report_matrices, report_responses, write_files
     from analysis.responses import read_responses
@@ -85,7 +91,7 @@ def command(
         raise click.UsageError("expected either RESPONSES or --matrices FILE.toml")
     if matrices is not None:
         given = {f"--{name.replace('_', '-')}": value for name, value in choices.items()}
-        given = {"--order": order, "--pair": pair, "--study": study, **given}
+        given = {"--order": order, "--pair": pair, "--study": study, "--factor": factor, **given}
         unused = [option for option, value in given.items() if value is not None]
         if unused:
             raise click.UsageError(f"{', '.join(unused)} cannot go with --matrices, which has its own names and order")
@@ -102,9 +108,10 @@ def command(
             study = beside
         else:
             notes = ("The manifest.json beside the table is not one of a study; it was not used.",)
-    answers = read_responses(responses, study and read_manifest(study), order)
+    answers = read_responses(responses, study and read_manifest(study), order, factor or FRAMING)
     answers = replace(answers, notes=notes + answers.notes)
     options = [(option, ",".join(value)) for option, value in (("--order", order), ("--pair", pair)) if value]
+    options += [("--factor", factor)] if factor else []
     options += [(f"--{name.replace('_', '-')}", str(value)) for name, value in choices.items() if value is not None]
     if study is not None:
         options.append(("--study", study.name))
