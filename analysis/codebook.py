@@ -60,10 +60,10 @@ class Codebook:
         return f"{number} {self.level if number == 1 else self.levels}"
 
     def by(self, factor: str, levels: Iterable[str], rule: str) -> Codebook:
-        """The same study with the levels of another factor in the place of its framings, labelled 'lighting day'."""
+        """The same study with the levels of another factor in the place of its framings: 'day', but '3 (familiarity)' for a number."""
         levels, spoken = tuple(levels), factor.replace("_", " ")
         labels = {key: label for key, label in self.labels.items() if key[0] != "framing"}
-        labels |= {("framing", level): f"{spoken} {level}" for level in levels}
+        labels |= {("framing", level): f"{level} ({spoken})" for level in levels if not any(map(str.isalpha, level))}
         return replace(self, framings=levels, framing_rule=rule, labels=labels, factor=factor)
 
     @property

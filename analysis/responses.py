@@ -315,13 +315,16 @@ def _where(row: object, codebook: Codebook) -> str:
 def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
     """What the levels of a factor hold, and how what they hold is taken."""
     held = frame.groupby("framing", observed=True).agg(people=("participant", "nunique"), answers=("answer", "size"))
-    sizes = "; ".join(f"{codebook.framing_label(level)}: {row.people} participants, {row.answers} answers" for level, row in held.iterrows())
+    sizes = "; ".join(
+        f"{codebook.framing_label(row.Index)}: {_plural(row.people, 'participant')}, {_plural(row.answers, 'answer')}"
+        for row in held.itertuples()
+    )
     yield f"Answers are grouped by {codebook.spoken} ({sizes}); the column framing of every table holds its levels."
     if len(held) == 1:
         yield f"There is one {codebook.level}: nothing is compared over it."
     few = [codebook.framing_label(level) for level in held.index[held.people < FEWEST_PEOPLE]]
     if few:
-        yield f"{_some(few)}: fewer than {FEWEST_PEOPLE} participants, and so no intervals and no tests."
+        yield f"{_some(few)}: fewer than {FEWEST_PEOPLE} participants, which resampled intervals and tests on participants need."
     here = frame.drop_duplicates(["framing", "image_framing"]).groupby("framing", observed=True).image_framing
     several = here.nunique()
     if (several > 1).any():
@@ -447,6 +450,10 @@ def _notes(frame: pd.DataFrame, raw: pd.DataFrame, codebook: Codebook) -> Iterab
     absent = [name for name in codebook.techniques if name not in present]
     if absent:
         yield f"No answers at all for {_some(absent)}."
+
+
+def _plural(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' if number != 1 else ''}"
 
 
 def _some(names: list[str], most: int = 6, mark: str = ", ") -> str:

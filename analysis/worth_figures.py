@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from . import figures
-from .codebook import Codebook
+from .codebook import FRAMING, Codebook
 from .figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
 from .options import OVERALL
 
@@ -45,7 +45,9 @@ DRAWN = {
 
 
 def framing_label(codebook: Codebook, name: str) -> str:
-    return f"All {codebook.levels}" if name == OVERALL else codebook.framing_label(name)
+    if name == OVERALL:
+        return "All framings" if codebook.factor == FRAMING else "All together"
+    return codebook.framing_label(name)
 
 
 def verdict(row: object, alpha: float) -> str:

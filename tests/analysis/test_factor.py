@@ -100,7 +100,7 @@ def test_without_the_factor_the_second_answer_would_be_a_duplicate(write, lit):
     assert len(read_responses(path).findings) == len(lit) // 2
     assert read_responses(path, factor="lighting").findings == ()
     first = read_responses(path, factor="display").findings[0]
-    assert "answered display LCD, " in first.reason and first.line == 2 + len(lit) // 2
+    assert "answered LCD, " in first.reason and first.line == 2 + len(lit) // 2
 
 
 def test_framing_itself_is_what_is_grouped_by_without_a_factor(write, random_study):
@@ -122,7 +122,7 @@ def test_levels_are_ordered_and_named(write, answer):
     responses = read_responses(write(rows, HEADER + ",distance_m"), factor="distance_m")
     assert responses.codebook.framings == ("1.5", "9", "10")
     assert responses.codebook.framing_rule == "from the lowest number to the highest"
-    assert responses.codebook.framing_label("9") == "distance m 9"
+    assert responses.codebook.framing_label("9") == "9 (distance m)"
     named = read_responses(write([row + ",b" for row in rows[:1]] + [row + ",a" for row in rows[1:]], HEADER + ",d,where"), factor="where")
     assert named.codebook.framings == ("b", "a")
 
@@ -148,7 +148,7 @@ def test_a_factor_that_a_few_people_vary_excludes_nobody_for_levels_they_never_m
 def test_what_levels_hold_is_said(write, lit):
     responses = read_responses(write(lit, HEADER + ",lighting,display"), factor="lighting")
     assert responses.notes[0] == (
-        "Answers are grouped by lighting (lighting evening: 8 participants, 72 answers; lighting day: 8 participants, 72 answers); "
+        "Answers are grouped by lighting (evening: 8 participants, 72 answers; day: 8 participants, 72 answers); "
         "the column framing of every table holds its levels."
     )
     assert "Every level of lighting pools framings (close-up, head-shot, half-length)" in responses.notes[1]
@@ -157,7 +157,7 @@ def test_what_levels_hold_is_said(write, lit):
     one = read_responses(write(lit[:72], HEADER + ",lighting,display"), factor="lighting")
     assert "There is one level of lighting: nothing is compared over it." in one.notes
     few = read_responses(write(lit[:72], HEADER + ",lighting,display"), factor="display")
-    assert "display OLED: fewer than 5 participants, and so no intervals and no tests." in few.notes
+    assert "OLED: fewer than 5 participants, which resampled intervals and tests on participants need." in few.notes
     assert any(note.startswith("Nobody judged the same images at several levels of display") for note in few.notes)
 
 
@@ -167,7 +167,7 @@ def test_the_report_names_the_factor(write, lit, undrawn):
     page, methods = files["report.html"].decode(), files["methods.md"].decode()
     assert "**Grouping.** Answers are grouped by lighting" in methods and "at 2 levels of lighting" in methods
     assert "Page's L" not in methods and "from near to far" not in page.lower()
-    assert "All levels of lighting" in page and "Strength of preference at each level of lighting" in page
+    assert "All together" in page and "Strength of preference at each level of lighting" in page
     assert "Lighting & Technique" in files["report.tex"].decode()
     assert "at each framing" not in page and "All framings" not in page and "within a framing" not in page
     assert files["tables/worths.csv"].startswith(b"framing,model,technique,estimate,low,high\nevening,")
