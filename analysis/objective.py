@@ -1,7 +1,7 @@
 """What an image costs and how far it is from the reference, beside how real people found it.
 
 Measures stand in the manifest, one table an image: `"measures": {"samples_per_pixel": 14.2, "milliseconds": 3.1, "dssim": 0.004}`. DSSIM
-to a reference is computed from the images themselves where the study has a condition of that name and the files are there.
+and FLIP to a reference are computed from the images themselves where the study has a condition of that name and the files are there.
 What is not in the manifest is said and never made up: a technique's parameters are no measurement.
 """
 
@@ -38,7 +38,7 @@ class Measured:
 
 
 def read_measures(path: str | Path, reference: str = REFERENCE) -> Measured:
-    """The measures of a manifest.json (or of the folder that holds it), DSSIM to the condition `reference` among them."""
+    """The measures of a manifest.json (or of the folder that holds it), distances to the condition `reference` among them."""
     path = Path(path)
     path = path / "manifest.json" if path.is_dir() else path
     try:
@@ -60,62 +60,79 @@ def read_measures(path: str | Path, reference: str = REFERENCE) -> Measured:
                 raise InputError(f"{path}: images[{place}].measures.{name} is {value!r:.60}, expected a number from 0")
             rows.append((image.get("framing"), image.get("technique"), name, float(value), "manifest"))
     held = sorted({name for _, _, name, _, _ in rows})
-    if "dssim" not in held:
-        found, why = _dssim(path.parent, images, reference)
+    if wanted := [name for name in DISTANCES if name not in held]:
+        found, why = _to_reference(path.parent, images, reference, wanted)
         rows += found
         notes += why
     for name in held:
         missing = len(images) - sum(row[2] == name for row in rows)
         if missing:
             notes.append(f"{missing} of {len(images)} images in the manifest have no {MEASURES[name]}.")
-    absent = [MEASURES[name] for name in MEASURES if name not in {row[2] for row in rows} and name != "dssim"]
+    absent = [MEASURES[name] for name in MEASURES if name not in {row[2] for row in rows} and name not in DISTANCES]
     if absent:
         notes.append(f"The manifest holds no {' and no '.join(absent)}; nothing is said of that.")
     return Measured(pd.DataFrame(rows, columns=["framing", "technique", "measure", "value", "source"]), tuple(notes))
 
 
-def _dssim(folder: Path, images: list[dict], reference: str) -> tuple[list[tuple], list[str]]:
-    """`dssim` of every image to the reference of its framing, on luminance."""
+def _to_reference(folder: Path, images: list[dict], reference: str, wanted: list[str]) -> tuple[list[tuple], list[str]]:
+    """The `wanted` distances of every image to the reference of its framing."""
     references = {image.get("framing"): image for image in images if image.get("technique") == reference}
     if not references:
         return [], [f"No condition is called {reference!r}, so that no image is compared to a reference."]
+    if not all((folder / str(image.get("file"))).is_file() for image in images):
+        return [], ["The images are not beside the manifest, so that none is compared to the reference."]
     from PIL import Image
 
-    def luminance(image: dict) -> np.ndarray:
+    def pixels(image: dict) -> np.ndarray:
         file = image.get("file")
         try:
             with Image.open(folder / str(file)) as picture:
-                return np.asarray(picture.convert("L"), float) / 255
+                return np.asarray(picture.convert("RGB"), np.float32) / 255
         except OSError as error:
             raise InputError(f"{folder / str(file)}: cannot be read as an image: {error}") from None
 
     rows, notes = [], []
-    if not all((folder / str(image.get("file"))).is_file() for image in images):
-        return [], ["The images are not beside the manifest, so that none is compared to the reference."]
     for framing, chosen in references.items():
-        against = luminance(chosen)
+        against = pixels(chosen)
         for image in images:
             if image.get("framing") == framing and image.get("technique") != reference:
-                other = luminance(image)
+                other = pixels(image)
                 if other.shape != against.shape:
                     notes.append(f"{image.get('technique')} at {framing} differs in size from the reference and is not compared.")
                     continue
-                rows.append((framing, image.get("technique"), "dssim", dssim(against, other), "images"))
+                rows += [(framing, image.get("technique"), name, DISTANCES[name](against, other), "images") for name in wanted]
     return rows, notes
 
 
 def dssim(x: np.ndarray, y: np.ndarray) -> float:
-    """(1 - SSIM)/2 of two images (H, W) in [0, 1]: 0 for the same one, at most 1.
+    """(1 - SSIM)/2 of the luma of two images (H, W, 3) in [0, 1], sRGB: 0 for the same one, at most 1.
 
     Mean SSIM in an 11 x 11 Gaussian window of 1.5 pixels with K1 = 0.01 and K2 = 0.03, where the window lies inside the image (Wang et al.
     2004, "Image quality assessment: from error visibility to structural similarity", doi:10.1109/TIP.2003.819861, eq. 13), by scikit-image.
     """
     from skimage.metrics import structural_similarity
 
-    if min(x.shape) < 11:
+    if min(x.shape[:2]) < 11:
         raise InputError(f"an image of {x.shape[1]} x {x.shape[0]} pixels is too small for DSSIM, expected 11 x 11 or more")
-    similarity = structural_similarity(x, y, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, K1=0.01, K2=0.03)
+    one, other = (np.asarray(image, float) @ LUMA for image in (x, y))
+    similarity = structural_similarity(one, other, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, K1=0.01, K2=0.03)
     return float((1 - similarity) / 2)
+
+
+def flip(x: np.ndarray, y: np.ndarray) -> float:
+    """Mean FLIP of two images (H, W, 3) in [0, 1], sRGB: 0 for the same one, at most 1; x is the reference.
+
+    Andersson et al. 2020, "FLIP: a difference evaluator for alternating images", doi:10.1145/3406183, by its authors' package, at their
+    67 pixels a degree.
+    """
+    import flip_evaluator
+
+    return float(flip_evaluator.evaluate(np.ascontiguousarray(x, np.float32), np.ascontiguousarray(y, np.float32), "LDR", applyMagma=False)[1])
+
+
+#: Distances to the reference that are computed from the images.
+DISTANCES = {"dssim": dssim, "flip": flip}
+LUMA = np.array([0.299, 0.587, 0.114])  # Rec. 601
 
 
 def against_worth(measured: pd.DataFrame, worths: pd.DataFrame, model: str = "thurstone_jod") -> pd.DataFrame:

@@ -12,19 +12,9 @@ import time
 import numpy as np
 
 import renderer
-from renderer import gl
 from stimuli.heads import load_head
 
 ROUNDS = 5
-
-
-def timed(work) -> tuple[float, float]:
-    """Wall and CPU seconds of `work()` with the GPU's queue empty before and after."""
-    gl.finish()
-    wall, cpu = time.perf_counter(), time.process_time()
-    work()
-    gl.finish()
-    return time.perf_counter() - wall, time.process_time() - cpu
 
 
 def main() -> None:
@@ -36,23 +26,15 @@ def main() -> None:
         print(f"{drawing.info()['gl_renderer']}, 1920x1080, 2x2 supersampling, {ROUNDS} rounds in turn, medians")
         print(f"head: {loaded[0]:.1f} s wall, {loaded[1]:.1f} s CPU")
         for framing in renderer.FRAMINGS:
-            frames = []
-            shared = timed(lambda: frames.append(drawing.frame(framing)))  # noqa: B023
-            frame = frames[0]
-            times = {name: [] for name in techniques}
+            start = time.perf_counter(), time.process_time()
+            frame = drawing.frame(framing)
+            shared = time.perf_counter() - start[0], time.process_time() - start[1]
             samples = {}
-            for round_ in range(ROUNDS + 1):
-                for name, technique in techniques.items():
-                    inputs = frame.inputs(technique.translucent)
-                    out = []
-                    spent = timed(lambda: out.append(technique.scatter(inputs)))  # noqa: B023
-                    if round_:  # the first compiles shaders
-                        times[name].append(spent)
-                    count = out[0].target.textures[1].read()[..., 0]
-                    samples[name] = count[count > 0].mean()
-                    out[0].target.delete()
+            for name, technique in techniques.items():
+                counts = frame.render(technique).samples
+                samples[name] = counts[counts > 0].mean()
+            median = {name: np.median(spent, axis=0) for name, spent in frame.time(techniques, ROUNDS).items()}
             frame.close()
-            median = {name: np.median(np.array(rows), axis=0) for name, rows in times.items()}
             print(f"\n{framing}: shared passes {shared[0]:.1f} s wall, {shared[1]:.1f} s CPU (once a framing)")
             print(f"{'technique':<18}{'wall ms':>9}{'CPU ms':>9}{'wall/golubev':>14}{'CPU/golubev':>13}{'samples':>9}")
             for name, (wall, cpu) in median.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -268,6 +269,25 @@ class Frame:
         for target in (scattered.target, colour, final):
             target.delete()
         return result
+
+    def time(self, techniques: dict[str, Technique], rounds: int) -> dict[str, np.ndarray]:
+        """Seconds that scattering alone takes: name -> (rounds, 2) of wall and CPU time.
+
+        The techniques run in turn, so that a machine's drift hits all alike; a round that compiles shaders goes before.
+        """
+        self.renderer.context.make_current()
+        spent = {name: np.empty((rounds, 2)) for name in techniques}
+        for k in range(-1, rounds):
+            for name, technique in techniques.items():
+                inputs = self.inputs(technique.translucent)
+                gl.finish()
+                start = np.array([time.perf_counter(), time.process_time()])
+                scattered = technique.scatter(inputs)
+                gl.finish()
+                if k >= 0:
+                    spent[name][k] = np.array([time.perf_counter(), time.process_time()]) - start
+                scattered.target.delete()
+        return spent
 
     def close(self) -> None:
         """Free the shared buffers."""

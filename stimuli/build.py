@@ -50,10 +50,11 @@ class Built:
     notes: tuple[str, ...] = ()
 
 
-def build(study: Study, out: str | Path, force: bool = False, progress: bool = False) -> Built:
+def build(study: Study, out: str | Path, force: bool = False, progress: bool = False, rounds: int = 0) -> Built:
     """Render what is missing or out of date of the study's images into `out`, and write the manifest.
 
-    `force` renders every image anew; `progress` shows a bar on stderr. Images of one study come from one
+    `force` renders every image anew; `progress` shows a bar on stderr. `rounds` also times every technique so often and
+    puts the median milliseconds of scattering alone into the manifest: they differ from run to run. Images of one study come from one
     OpenGL driver: when it differs from that of the finished images, these are rendered anew as well.
     """
     out = Path(out)
@@ -67,7 +68,7 @@ def build(study: Study, out: str | Path, force: bool = False, progress: bool = F
     plan = _plan(study, parameters, head.provenance)
     (out / "images").mkdir(parents=True, exist_ok=True)
     kept = set() if force else {s.file for s in plan if _is_finished(out, s, state)}
-    if len(kept) < len(plan):
+    if len(kept) < len(plan) or rounds:
         render = study.render
         with Renderer(head.model, size=render.size, supersample=render.supersample, seed=render.seed) as drawing:
             driver = drawing.info()
@@ -76,6 +77,8 @@ def build(study: Study, out: str | Path, force: bool = False, progress: bool = F
             (out / manifest.NAME).unlink(missing_ok=True)
             entry = {"renderer": {**driver, "commit": commit()}, "head": head.provenance}
             _render(study, todo, drawing, out, state, entry, progress)
+            if rounds:
+                _time(plan, drawing, out, state, rounds)
     _remove_strays(out, state, {s.file for s in plan})
     record = {
         "format": manifest.FORMAT,
@@ -213,6 +216,15 @@ def _render(
         raise Stopped(
             f"stopped with {finished} of {len(todo)} images rendered; `subdermal build` without --force goes on from there"
         ) from error
+
+
+def _time(plan: list[Stimulus], drawing: Any, out: Path, state: dict, rounds: int) -> None:
+    """Put each image's median milliseconds of scattering into its measures."""
+    for framing in dict.fromkeys(s.framing for s in plan):
+        shown = {s.file: s.parameters for s in plan if s.framing == framing}
+        for file, spent in drawing.frame(framing).time(shown, rounds).items():
+            state[file]["image"]["measures"]["milliseconds"] = round(1000 * float(np.median(spent[:, 0])), 1)
+    _write_json(out / STATE, {"format": STATE_FORMAT, "images": state})
 
 
 def _remove_strays(out: Path, state: dict, wanted: Iterable[str]) -> None:

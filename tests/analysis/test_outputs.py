@@ -219,11 +219,13 @@ def test_dssim_is_wang_and_others_formula_window_by_window():
             var_a, var_b = (weight * (a - mean_a) ** 2).sum(), (weight * (b - mean_b) ** 2).sum()
             cov = (weight * (a - mean_a) * (b - mean_b)).sum()
             values.append((2 * mean_a * mean_b + 1e-4) * (2 * cov + 9e-4) / ((mean_a**2 + mean_b**2 + 1e-4) * (var_a + var_b + 9e-4)))
-    assert objective.dssim(x, y) == pytest.approx((1 - np.mean(values)) / 2, rel=1e-9)
-    assert objective.dssim(x, x) == pytest.approx(0, abs=1e-12) and objective.dssim(x, y) == pytest.approx(objective.dssim(y, x))
+    grey_x, grey_y = (np.repeat(image[..., None], 3, axis=2) for image in (x, y))
+    assert objective.dssim(grey_x, grey_y) == pytest.approx((1 - np.mean(values)) / 2, rel=1e-9)
+    assert objective.dssim(grey_x, grey_x) == pytest.approx(0, abs=1e-12)
+    assert objective.dssim(grey_x, grey_y) == pytest.approx(objective.dssim(grey_y, grey_x))
 
 
-def test_dssim_to_the_reference_comes_from_the_images(tmp_path):
+def test_distances_to_the_reference_come_from_the_images(tmp_path):
     rng = np.random.default_rng(1)
     base = rng.integers(0, 255, (20, 24), np.uint8)
     images = []
@@ -231,8 +233,10 @@ def test_dssim_to_the_reference_comes_from_the_images(tmp_path):
         picture = np.clip(base + rng.normal(0, 1, base.shape) * noise, 0, 255).astype(np.uint8)
         Image.fromarray(picture).save(tmp_path / f"{name}.png")
         images.append({"framing": "x", "technique": name, "file": f"{name}.png"})
-    found = objective.read_measures(manifest(tmp_path, images)).table.set_index("technique").value
-    assert 0 < found["near"] < found["far"] < 1 and "reference" not in found
+    table = objective.read_measures(manifest(tmp_path, images)).table
+    for measure in ("dssim", "flip"):
+        found = table[table.measure == measure].set_index("technique").value
+        assert 0 < found["near"] < found["far"] < 1 and "reference" not in found
     assert not objective.read_measures(tmp_path, reference="near").table.empty
     (tmp_path / "far.png").unlink()
     assert "not beside the manifest" in " ".join(objective.read_measures(tmp_path).notes)

@@ -135,6 +135,12 @@ def test_command_line_refuses_in_one_line(arguments, words, capsys, tmp_path, mo
     assert not list(tmp_path.iterdir())
 
 
+def test_times_are_taken_of_every_technique(frames, techniques):
+    spent = frames["head-shot"].time(techniques, 2)
+    assert spent.keys() == techniques.keys()
+    assert all(times.shape == (2, 2) and (times[:, 0] > 0).all() and (times >= 0).all() for times in spent.values())
+
+
 def test_sizes_out_of_range_are_refused(model):
     for size, supersample in (((8, 90), 1), ((9000, 90), 1), ((5000, 90), 2), ((160, 90), 7)):
         with pytest.raises(InputError, match="expected"):

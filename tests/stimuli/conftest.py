@@ -146,7 +146,10 @@ class FakeRenderer:
             image = np.tile(np.frombuffer(colour, np.uint8), (self.size[1], self.size[0], 1))
             return SimpleNamespace(image=image, samples=np.array([[0, 4], [0, 9]], np.uint8))
 
-        return SimpleNamespace(render=render)
+        def time(techniques, rounds):
+            return {name: np.tile([0.002 * (k + 1), 9.0], (rounds, 1)) for k, name in enumerate(techniques)}
+
+        return SimpleNamespace(render=render, time=time)
 
 
 @pytest.fixture

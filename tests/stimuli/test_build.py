@@ -47,6 +47,15 @@ def test_manifest_tells_how_each_image_was_made(small_study, fake_renderer, out)
     assert len({image.sha256 for image in manifest.images}) == 4
 
 
+def test_times_are_measured_when_asked_and_kept(small_study, fake_renderer, out):
+    build(small_study, out)
+    assert build(small_study, out, rounds=3) == built(0, 4)
+    expected = [2.0, 4.0, 2.0, 4.0]
+    assert [image.measures["milliseconds"] for image in load_manifest(out).images] == expected
+    assert build(small_study, out) == built(0, 4)
+    assert [image.measures["milliseconds"] for image in load_manifest(out).images] == expected
+
+
 def test_shared_passes_are_drawn_once_per_framing(small_study, fake_renderer, out):
     build(small_study, out)
     assert fake_renderer.frames == ["near", "far"]
