@@ -1,7 +1,7 @@
 """Burley's three curve fits against our own Monte Carlo, albedo 0.01 to 0.99: mean relative errors beside the published ones.
 
 Every albedo is simulated by itself (montecarlo.half_space) with about the same time, so that low albedos get the most photons;
-results are kept, and an interrupted run goes on. What seeds/000 tells of the memo says neither at which radii it compared
+results are kept, and an interrupted run goes on. What Vuletic tells of the memo says neither at which radii it compared
 nor how they were spaced, so the table has several readings: ranges of radii in mean free paths or in each parametrisation's
 own length; rings of equal weight on a logarithmic or a linear scale of r, or weighted by the light in them. Only rings
 that are known to KNOWN count. See docs/montecarlo.md.

@@ -167,7 +167,7 @@ class Stack:
 
 
 def sigma_a_from_index(imaginary, wavelength_nm) -> np.ndarray:
-    """Absorption, 1/mm, of a complex index of refraction: sigma_a = 4 pi Im(eta) / lambda (seeds/001, sec. 4.2.1)."""
+    """Absorption, 1/mm, of a complex index of refraction: sigma_a = 4 pi Im(eta) / lambda (Rohat, sec. 4.2.1)."""
     imaginary, wavelength_nm = np.asarray(imaginary, dtype=float), np.asarray(wavelength_nm, dtype=float)
     if not (np.isfinite(imaginary).all() and (imaginary >= 0).all()):
         raise InputError(f"imaginary index is {imaginary}; expected numbers of 0 or more")
@@ -176,12 +176,12 @@ def sigma_a_from_index(imaginary, wavelength_nm) -> np.ndarray:
     return 4 * np.pi * imaginary / (wavelength_nm * 1e-6)
 
 
-# seeds/001, tables 4.2 and 4.3: marble's complex index at three wavelengths.
+# Rohat, tables 4.2 and 4.3: marble's complex index at three wavelengths.
 MARBLE_IMAGINARY_INDEX = (1.16979e-7, 1.79447e-7, 2.40125e-7)
 MARBLE_WAVELENGTH_NM = (700.0, 550.0, 425.0)
 
 _JENSEN = "measured: Jensen et al. 2001, fig. 5"
-_JENSEN_APPLE = _JENSEN + "; seeds/001 table 4.1 prints sigma_a blue as 0.46, a lost zero"
+_JENSEN_APPLE = _JENSEN + "; Rohat table 4.1 prints sigma_a blue as 0.46, a lost zero"
 _BY_EYE = "chosen by eye: no measurement is published"
 _DONNER = "Donner and Jensen 2005, three-layer skin (after Tuchin 2000), on which d'Eon and Luebke 2007 build their six Gaussians"
 
@@ -203,8 +203,8 @@ MEDIA: dict[str, Medium] = {medium.name: medium for medium in (
     _jensen("skin2", (1.09, 1.59, 1.79), (0.013, 0.070, 0.145)),
     _jensen("spectralon", (11.6, 20.4, 14.9), (0.0, 0.0, 0.0)),
     _jensen("wholemilk", (2.55, 3.21, 3.77), (0.0011, 0.0024, 0.014)),
-    Medium((0.05, 0.006, 0.035), (1.1, 1.3, 1.2), 1.66, name="green_jade", source=_BY_EYE + "; seeds/001 figs. 6.3, 6.8 show it; index of jadeite"),
-    Medium((0.03, 0.09, 0.28), (1.5, 1.7, 1.9), 1.35, name="chocolate_milk", source=_BY_EYE + "; seeds/001 fig. A.10 shows it"),
+    Medium((0.05, 0.006, 0.035), (1.1, 1.3, 1.2), 1.66, name="green_jade", source=_BY_EYE + "; Rohat figs. 6.3, 6.8 show it; index of jadeite"),
+    Medium((0.03, 0.09, 0.28), (1.5, 1.7, 1.9), 1.35, name="chocolate_milk", source=_BY_EYE + "; Rohat fig. A.10 shows it"),
     Medium((0.21, 0.21, 0.50), (4.8, 6.0, 6.5), 1.4, name="epidermis", source=_DONNER),
     Medium((0.016, 0.019, 0.030), (3.2, 4.0, 4.6), 1.4, name="upper_dermis", source=_DONNER),
     Medium((0.0085, 0.10, 2.5), (0.45, 0.47, 0.48), 1.4, name="bloody_dermis", source=_DONNER),

@@ -13,8 +13,8 @@ import click
 @click.option("--photons", type=click.IntRange(1000), default=1_000_000, show_default=True, help="Photons of the three figures that need Monte Carlo.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the photons.")
 def command(folder, wanted, suffix, photons, seed):
-    """Draw the documents' figures of profiles again into DIR: dipole and multipole of marble (seeds/001), Burley's fits against Monte
-    Carlo, guided kernels and the artist's Gaussians (seeds/000).
+    """Draw the documents' figures of profiles again into DIR: dipole and multipole of marble (Rohat), Burley's fits against Monte
+    Carlo, guided kernels and the artist's Gaussians (Vuletic).
 
     With a million photons the three figures that need them take about a minute.
     """

@@ -19,7 +19,7 @@ HALLEY_STEPS = 60
 
 
 def reflectance(r_mm, d_mm, albedo=1.0):
-    """R(r) in 1/mm^2, singular at 0. seeds/000 eqs. 2.83 and 2.84 leave out the albedo."""
+    """R(r) in 1/mm^2, singular at 0. Vuletic eqs. 2.83 and 2.84 leave out the albedo."""
     r, s = np.asarray(r_mm, dtype=float), 1 / np.asarray(d_mm, dtype=float)
     return albedo * s * (np.exp(-s * r) + np.exp(-s * r / 3)) / (8 * np.pi * r)
 
@@ -38,7 +38,7 @@ def inverse_cdf(u, d_mm=1.0):
 
 
 def inverse_cdf_halley(u, d_mm=1.0, tolerance: float = 1e-14):
-    """The same r by Halley's iteration (seeds/000 eq. 3.11), the way before the closed form was known; raises if it does not converge.
+    """The same r by Halley's iteration (Vuletic eq. 3.11), the way before the closed form was known; raises if it does not converge.
 
     In y = exp(-x / 3), 1 - P is the polynomial (y^3 + 3 y) / 4: smooth, monotone, with one root in (0, 1]; so the
     iteration is done there, to a relative `tolerance` in y.
@@ -85,7 +85,7 @@ def line_integral(a_mm, b_mm, d_mm=1.0):
     return (primitive(b) - primitive(a) + 3 * (primitive(b / 3) - primitive(a / 3))) / (4 * np.pi)
 
 
-# The memo's three fits: A -> s for d = length / s. seeds/000 eqs. 2.86, 2.88 and 2.89.
+# The memo's three fits: A -> s for d = length / s. Vuletic eqs. 2.86, 2.88 and 2.89.
 def s_searchlight_mfp(albedo):
     """Light straight down, length = mean free path: s = 1.85 - A + 7 |A - 0.8|^3."""
     return 1.85 - albedo + 7 * np.abs(albedo - 0.8) ** 3
@@ -134,7 +134,7 @@ class Burley(Profile):
         if self.parametrisation == "dmfp":
             if min(m.sigma_a) == 0:
                 raise InputError("sigma_a is 0: there is no diffuse mean free path; expected the parametrisation mfp or diffuse")
-            length = np.sqrt(grosjean_D(m.sigma_a, m.sigma_s_prime) / np.array(m.sigma_a))  # seeds/000 eq. 2.87
+            length = np.sqrt(grosjean_D(m.sigma_a, m.sigma_s_prime) / np.array(m.sigma_a))  # Vuletic eq. 2.87
         else:
             length = m.mfp
         return length / PARAMETRISATIONS[self.parametrisation](albedo)

@@ -1,7 +1,7 @@
 """Dipoles over a half-space: Jensen et al. 2001 and d'Eon 2012.
 
 Jensen, Marschner, Levoy, Hanrahan 2001, doi:10.1145/383259.383319. d'Eon 2012, "A better dipole" (technical report);
-seeds/000 eq. 2.59, seeds/001 sec. 3.4.1, seeds/004. The better dipole leaves out single scattering (see single.py).
+Vuletic eq. 2.59, Rohat sec. 3.4.1, BSSRDF notes. The better dipole leaves out single scattering (see single.py).
 """
 
 from __future__ import annotations
@@ -84,5 +84,5 @@ class BetterDipole(Profile):
         kappa = np.sqrt((1 - a) * (2 - a) / 3)  # sigma_tr D
         with np.errstate(invalid="ignore"):
             lost = np.where(kappa > 0, -np.expm1(-4 * A * kappa) / np.where(kappa > 0, kappa, 1), 4 * A)
-        # seeds/facts: alpha'^2 / 2 exp(-sqrt(3 (1-a) / (2-a))) [C_E (1 + exp(-4 A k)) + C_phi / k (1 - exp(-4 A k))]
+        # an independent recomputation: alpha'^2 / 2 exp(-sqrt(3 (1-a) / (2-a))) [C_E (1 + exp(-4 A k)) + C_phi / k (1 - exp(-4 A k))]
         return a**2 / 2 * np.exp(-np.sqrt(3 * (1 - a) / (2 - a))) * (c_e * (1 + np.exp(-4 * A * kappa)) + c_phi * lost), None

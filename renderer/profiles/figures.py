@@ -77,7 +77,7 @@ def compare(profiles: list[Profile], r_max: float | None = None):
 
 # The documents' figures, drawn again. Each takes photons and seed, of which only the Monte Carlo ones make use.
 def dipole_of_marble(photons: int, seed: int):
-    """seeds/001 fig. 4.4: the dipole's reflectance profile of marble."""
+    """Rohat fig. 4.4: the dipole's reflectance profile of marble."""
     plt = _pyplot()
     figure, axis = plt.subplots(figsize=(5, 3.4))
     r = np.linspace(0.01, 4, 500)
@@ -98,7 +98,7 @@ def _marble_slab(mean_free_paths: float) -> Profile:
 
 
 def multipole_of_marble(photons: int, seed: int):
-    """seeds/001 fig. 4.5: reflectance and transmittance profiles of marble 2, 10 and 20 mean free paths thick."""
+    """Rohat fig. 4.5: reflectance and transmittance profiles of marble 2, 10 and 20 mean free paths thick."""
     plt = _pyplot()
     figure, axes = plt.subplots(3, 2, figsize=(7.5, 7.5))
     for row, thickness in zip(axes, (2, 10, 20), strict=True):
@@ -117,7 +117,7 @@ def multipole_of_marble(photons: int, seed: int):
 
 
 def thin_marble(photons: int, seed: int):
-    """seeds/001 fig. 4.6: the multipole's transmittance profile where the slab is too thin for it, with the slab by quantized diffusion."""
+    """Rohat fig. 4.6: the multipole's transmittance profile where the slab is too thin for it, with the slab by quantized diffusion."""
     plt = _pyplot()
     figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.4))
     r = np.linspace(0.003, 1.5, 500)
@@ -149,12 +149,12 @@ def _burley(parametrisation: str, title: str, published: tuple[float, float]):
         errors.legend(fontsize=8)
         return figure
 
-    draw.__doc__ = f"seeds/000: {title}, the best s by Monte Carlo and the published fit."
+    draw.__doc__ = f"Vuletic: {title}, the best s by Monte Carlo and the published fit."
     return draw
 
 
 def guided_kernels(photons: int, seed: int):
-    """seeds/000 fig. 3.5: guided kernels of d'Eon and Luebke's red profile for several k, beside the profile."""
+    """Vuletic fig. 3.5: guided kernels of d'Eon and Luebke's red profile for several k, beside the profile."""
     plt = _pyplot()
     reach = 6.0
     profile = lambda r: gaussians.reflectance(r)[:, 0]  # noqa: E731
@@ -175,7 +175,7 @@ def guided_kernels(photons: int, seed: int):
 
 
 def artist_profile(photons: int, seed: int):
-    """seeds/000 fig. 3.6: the artist's two Gaussians, near and far, per channel."""
+    """Vuletic fig. 3.6: the artist's two Gaussians, near and far, per channel."""
     plt = _pyplot()
     x = np.linspace(-3, 3, 1201)
     near, far, w = (0.09, 0.07, 0.05), (1.0, 0.45, 0.25), (0.35, 0.45, 0.55)

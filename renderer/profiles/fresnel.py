@@ -51,7 +51,7 @@ def moment(i: int, eta: float) -> float:
 
 
 def diffuse_reflectance(eta: float) -> float:
-    """F_dr = (1/pi) int F (n . w) dw = 2 int F mu dmu, exact. seeds/001 sec. 3.4.1 loses the 1/pi."""
+    """F_dr = (1/pi) int F (n . w) dw = 2 int F mu dmu, exact. Rohat sec. 3.4.1 loses the 1/pi."""
     return 2 * moment(1, eta)
 
 
@@ -74,7 +74,7 @@ def two_c1_fit(eta: float) -> float:
 
 
 def three_c2_fit(eta: float) -> float:
-    """3 C_2 by d'Eon and Irving 2011 (not printed in seeds/004); 0 where the indices match."""
+    """3 C_2 by d'Eon and Irving 2011 (not printed in BSSRDF notes); 0 where the indices match."""
     if _check(eta) == 1:
         return 0.0
     if eta < 1:
@@ -83,7 +83,7 @@ def three_c2_fit(eta: float) -> float:
 
 
 def extrapolation(eta: float, fit: bool = True) -> float:
-    """A = (1 + F_dr) / (1 - F_dr) of the classic boundary, by the polynomial where it holds. seeds/001 sec. 4.2.2 prints its reciprocal."""
+    """A = (1 + F_dr) / (1 - F_dr) of the classic boundary, by the polynomial where it holds. Rohat sec. 4.2.2 prints its reciprocal."""
     f = diffuse_reflectance_fit(eta) if fit and FIT_RANGE[0] <= eta <= FIT_RANGE[1] else diffuse_reflectance(eta)
     return (1 + f) / (1 - f)
 
@@ -100,7 +100,7 @@ def exit_moments(eta: float, fit: bool = True) -> tuple[float, float]:
 
 
 def exit_weights(eta: float, fit: bool = True) -> tuple[float, float]:
-    """(C_phi, C_E) = ((1 - 2 C_1) / 4, (1 - 3 C_2) / 2); seeds/004 prints them without the 1/4 and 1/2."""
+    """(C_phi, C_E) = ((1 - 2 C_1) / 4, (1 - 3 C_2) / 2); BSSRDF notes prints them without the 1/4 and 1/2."""
     c1, c2 = exit_moments(eta, fit)
     return (1 - c1) / 4, (1 - c2) / 2
 

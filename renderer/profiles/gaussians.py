@@ -62,7 +62,7 @@ def transmittance(thickness_mm: np.ndarray, published: bool = False, variance=SK
 
 
 def radial_error(r_mm, target, approximation) -> np.ndarray:
-    """E = sqrt(int r (R - G)^2 dr) / sqrt(int r R^2 dr) per channel (seeds/000 eq. 3.1): (N,), (N, C), (N, C) -> (C,)."""
+    """E = sqrt(int r (R - G)^2 dr) / sqrt(int r R^2 dr) per channel (Vuletic eq. 3.1): (N,), (N, C), (N, C) -> (C,)."""
     r = np.asarray(r_mm, dtype=float)[:, None]
     return np.sqrt(np.trapezoid(r * (target - approximation) ** 2, r, axis=0) / np.trapezoid(r * target**2, r, axis=0))
 

@@ -1,6 +1,6 @@
 """Any number of layers: multipoles joined in frequency space (Kubelka and Munk), Donner and Jensen 2005.
 
-Two ways that must agree: a two-dimensional FFT of tabulated profiles, as in seeds/001 sec. 5.1.2, and a Hankel transform of the
+Two ways that must agree: a two-dimensional FFT of tabulated profiles, as in Rohat sec. 5.1.2, and a Hankel transform of the
 multipole's exact spectrum. A sign says from which side a layer is lit: + from above, - from below.
 """
 
@@ -33,7 +33,7 @@ class Faces(NamedTuple):
 def join(a: Faces, b: Faces) -> Faces:
     """Layer a on top of layer b, per frequency.
 
-    T12+ = T1+ T2+ / (1 - R1- R2+), R12+ = R1+ + T1+ R2+ T1- / (1 - R1- R2+), and mirrored. seeds/000 eqs. 2.81 and 2.82 write
+    T12+ = T1+ T2+ / (1 - R1- R2+), R12+ = R1+ + T1+ R2+ T1- / (1 - R1- R2+), and mirrored. Vuletic eqs. 2.81 and 2.82 write
     one R1 and T1 for both sides, which holds only where the layer is the same from both.
     """
     echo = 1 - a.R_below * b.R
@@ -129,7 +129,7 @@ class Layered(Profile):
         """R_d and T_d along a row of the FFT grid: radii (size / 4,) and (size / 4, C) each.
 
         Profiles are tabulated on a size x size grid that holds twice the support (no wrap), times spacing^2 a convolution,
-        which seeds/000 eqs. 2.77 f. and seeds/001 sec. 5.1.2 leave out.
+        which Vuletic eqs. 2.77 f. and Rohat sec. 5.1.2 leave out.
         """
         delta = spacing_mm or self._finest_mm() / 5
         x = delta * np.minimum(np.arange(size), size - np.arange(size))

@@ -2,7 +2,7 @@
 
 z points down, the slab is 0..d, l = 1 / sigma_t', z_b = 2 A D at each face; images i = -n..n at
 z_r,i = 2 i P + l and z_v,i = 2 i P - l - 2 z_b(0), with the half period P = d + z_b(0) + z_b(d). Errors of the documents
-(seeds/000 eqs. 2.65 to 2.67, seeds/001 eq. 3.6 and sec. 4.2.2) are listed in docs/profiles.md.
+(Vuletic eqs. 2.65 to 2.67, Rohat eq. 3.6 and sec. 4.2.2) are listed in docs/profiles.md.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Quantized diffusion: d'Eon and Irving 2011, "A quantized-diffusion model for rendering translucent materials", doi:10.1145/1964921.1964951.
 
-Diffusion from an extended source, sliced in time: each slice is a Gaussian of variance v_i. seeds/004 garbles the weights; the
+Diffusion from an extended source, sliced in time: each slice is a Gaussian of variance v_i. BSSRDF notes garbles the weights; the
 forms below use erfcx, which neither overflows nor loses digits at any variance. Single scattering is not part of it (single.py).
 """
 

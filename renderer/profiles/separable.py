@@ -60,7 +60,7 @@ def preintegrated_kernel(taps: int, reach_mm: float) -> tuple[np.ndarray, np.nda
 def artist(x_mm, sigma_near_mm, sigma_far_mm, near_weight, scale: float = 1.0) -> np.ndarray:
     """a_m(x) = w G(x, sigma_n) + (1 - w) G(x, sigma_f), eq. 3.7, sigma = sigma' scale: (N,) and (C,) -> (N, C), 1/mm.
 
-    G(x, sigma) = exp(-x^2 / 2 sigma^2) / (sqrt(2 pi) sigma); seeds/000 eq. 3.8 prints 1 / (2 pi sigma), which does not integrate to 1.
+    G(x, sigma) = exp(-x^2 / 2 sigma^2) / (sqrt(2 pi) sigma); Vuletic eq. 3.8 prints 1 / (2 pi sigma), which does not integrate to 1.
     """
     near, far, w = (np.atleast_1d(np.asarray(v, dtype=float)) for v in (sigma_near_mm, sigma_far_mm, near_weight))
     if not ((near > 0).all() and (far > 0).all() and scale > 0):

@@ -17,7 +17,7 @@ def test_both_inversions_agree_with_the_cdf():
 
 
 def test_the_printed_inverse_is_wrong():
-    """seeds/000 eq. 3.12 with both exponents -1/3 gives negative radii."""
+    """Vuletic eq. 3.12 with both exponents -1/3 gives negative radii."""
     u = 1 - 0.1
     g = 1 + 4 * u * (2 * u + np.sqrt(1 + 4 * u * u))
     assert 3 * np.log((1 + 2 * g ** (-1 / 3)) / (4 * u)) < 0 < burley.inverse_cdf(0.1)
@@ -28,7 +28,7 @@ def test_cdf_is_the_integral_of_the_profile():
         assert burley.cdf(r, 0.8) == pytest.approx(quad(lambda x: 2 * np.pi * x * burley.reflectance(x, 0.8), 0, r)[0], abs=1e-12)
 
 
-@pytest.mark.parametrize(("fit", "at_02", "at_08"), [  # the formulas of seeds/000 by hand
+@pytest.mark.parametrize(("fit", "at_02", "at_08"), [  # the formulas of Vuletic by hand
     (burley.s_searchlight_mfp, 1.85 - 0.2 + 7 * 0.216, 1.05), (burley.s_searchlight_dmfp, 3.5 + 100 * 0.13**4, 3.5 + 100 * 0.47**4),
     (burley.s_diffuse_mfp, 1.9 - 0.2 + 3.5 * 0.36, 1.1)])
 def test_fits(fit, at_02, at_08):
@@ -36,7 +36,7 @@ def test_fits(fit, at_02, at_08):
 
 
 def test_kernel_along_a_line():
-    assert burley.line_kernel(1.0) == pytest.approx(0.1350914, abs=1e-7)  # facts B.7
+    assert burley.line_kernel(1.0) == pytest.approx(0.1350914, abs=1e-7)  # recomputed
     across = quad(lambda y: burley.reflectance(np.hypot(0.4, y), 0.6), -60, 60, points=[0], limit=400)[0]
     assert burley.line_kernel(0.4, 0.6) == pytest.approx(across, rel=1e-8)
     assert burley.line_integral(-np.inf, np.inf, 0.6) == pytest.approx(1, abs=1e-12)
@@ -45,13 +45,13 @@ def test_kernel_along_a_line():
 
 
 def test_transmittance_of_a_slab():
-    assert burley.transmittance(1.0, 1.0) == pytest.approx(0.6293683, abs=1e-7)  # facts B.7
+    assert burley.transmittance(1.0, 1.0) == pytest.approx(0.6293683, abs=1e-7)  # recomputed
     through = quad(lambda r: 2 * np.pi * r * burley.reflectance(np.hypot(r, 0.5), 0.7), 0, 80, limit=400)[0]
     assert burley.transmittance(0.5, 0.7) == pytest.approx(through, rel=1e-8)
 
 
 def test_albedo_is_part_of_the_profile():
-    """seeds/000 eqs. 2.83 and 2.84 lose it: as printed, the integral is 1 whatever the albedo."""
+    """Vuletic eqs. 2.83 and 2.84 lose it: as printed, the integral is 1 whatever the albedo."""
     assert quad(lambda r: 2 * np.pi * r * burley.reflectance(r, 0.3, 0.42), 0, 30, limit=200)[0] == pytest.approx(0.42, rel=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Dipoles, multipole, layers, quantized diffusion: numbers of facts.md (recomputed there) and properties that each must have."""
+"""Dipoles, multipole, layers, quantized diffusion: numbers recomputed independently and properties that each must have."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def integral(curve, r_max, r_min=1e-7) -> np.ndarray:
     return ((half[:, None] * w).ravel() * 2 * np.pi * r**2) @ curve(r)
 
 
-JENSEN_TOTALS = {  # facts B.1
+JENSEN_TOTALS = {  # recomputed
     "apple": (0.846, 0.841, 0.528), "chicken1": (0.314, 0.156, 0.126), "chicken2": (0.321, 0.160, 0.108), "cream": (0.976, 0.900, 0.725),
     "ketchup": (0.164, 0.006, 0.002), "marble": (0.830, 0.791, 0.753), "potato": (0.764, 0.612, 0.213), "skimmilk": (0.815, 0.813, 0.682),
     "skin1": (0.436, 0.227, 0.131), "skin2": (0.623, 0.433, 0.343), "spectralon": (1, 1, 1), "wholemilk": (0.908, 0.881, 0.759)}
@@ -39,10 +39,10 @@ def test_dipole_totals_of_the_measured_materials(name):
 
 
 def test_dipole_values():
-    np.testing.assert_allclose(Dipole(preset("skin1")).reflectance([0.1, 1, 5])[:, 1], (0.0617124, 0.0182332, 1.02534e-4), rtol=2e-5)  # facts B.1
+    np.testing.assert_allclose(Dipole(preset("skin1")).reflectance([0.1, 1, 5])[:, 1], (0.0617124, 0.0182332, 1.02534e-4), rtol=2e-5)  # recomputed
 
 
-@pytest.mark.parametrize(("eta", "totals"), [  # facts B.2
+@pytest.mark.parametrize(("eta", "totals"), [  # recomputed
     (1.3, (0.0289, 0.1312, 0.2434, 0.6421)), (1.4, (0.0249, 0.1134, 0.2135, 0.6045)), (1.5, (0.0216, 0.0984, 0.1872, 0.5665))])
 def test_better_dipole_totals(eta, totals):
     stack = Stack.of(Medium((0.5, 0.2, 0.1, 0.01), (0.5, 0.8, 0.9, 0.99), eta))
@@ -50,7 +50,7 @@ def test_better_dipole_totals(eta, totals):
 
 
 def test_better_dipole_values():
-    np.testing.assert_allclose(BetterDipole(one(0.1, 0.9, 1.4)).reflectance([0.1, 1, 5])[:, 0], (0.029665, 0.012714, 2.8705e-4), rtol=5e-5)  # facts B.2
+    np.testing.assert_allclose(BetterDipole(one(0.1, 0.9, 1.4)).reflectance([0.1, 1, 5])[:, 0], (0.029665, 0.012714, 2.8705e-4), rtol=5e-5)  # recomputed
 
 
 @pytest.mark.parametrize("name", ["dipole", "better_dipole", "multipole", "layered", "quantized_diffusion", "burley", "gaussian_sum"])
@@ -77,7 +77,7 @@ def test_without_absorption_nothing_is_lost(name):
     np.testing.assert_allclose(R + (0 if T is None else T), 1, atol=2e-3 if name == "quantized_diffusion" else 1e-6)
 
 
-@pytest.mark.parametrize(("eta", "sigma_a", "sigma_s", "d", "R", "T"), [  # facts B.3
+@pytest.mark.parametrize(("eta", "sigma_a", "sigma_s", "d", "R", "T"), [  # recomputed
     (1.5, 0.0041, 2.62, 1, 0.52906, 0.44990), (1.5, 0.0041, 2.62, 4, 0.7243, 0.1962),
     (1.0, 0.02, 2.0, 2, 0.6398, 0.2727), (1.0, 0.02, 2.0, 4, 0.7243, 0.1193)])
 def test_multipole_totals(eta, sigma_a, sigma_s, d, R, T):
@@ -85,7 +85,7 @@ def test_multipole_totals(eta, sigma_a, sigma_s, d, R, T):
     np.testing.assert_allclose([got[0][0], got[1][0]], [R, T], atol=6e-5)
 
 
-@pytest.mark.parametrize(("images", "R", "T"), [(1, 0.618, 0.357), (2, 0.559, 0.418), (5, 0.5302, 0.4487)])  # facts B.3
+@pytest.mark.parametrize(("images", "R", "T"), [(1, 0.618, 0.357), (2, 0.559, 0.418), (5, 0.5302, 0.4487)])  # recomputed
 def test_multipole_with_few_images(images, R, T):
     model = Multipole(one(0.0041, 2.62, 1.5, 1.0), images)
     assert integral(model.reflectance, 2000.0)[0] == pytest.approx(R, abs=6e-4)
@@ -145,7 +145,7 @@ def test_fft_method_interpolates_its_grid():
         Layered(stack, "fft").reflectance([1e4])
 
 
-@pytest.mark.parametrize(("d", "R", "T"), [(2.0, 0.6226, 0.2939), (4.0, 0.7203, 0.1259)])  # facts B.4
+@pytest.mark.parametrize(("d", "R", "T"), [(2.0, 0.6226, 0.2939), (4.0, 0.7203, 0.1259)])  # recomputed
 def test_two_halves(d, R, T):
     half = Layer(Medium((0.02,), (2.0,), 1.0), d / 2)
     got = Layered(Stack((half, half))).totals()
@@ -170,7 +170,7 @@ def test_join_is_associative():
 
 
 def test_an_asymmetric_first_layer_needs_both_its_faces():
-    """seeds/000 eq. 2.82 writes R12 = R1 + T1 R2 T1 / (1 - R1 R2) with one R1 and T1 for both sides: right only without mismatch."""
+    """Vuletic eq. 2.82 writes R12 = R1 + T1 R2 T1 / (1 - R1 R2) with one R1 and T1 for both sides: right only without mismatch."""
     for eta_below, same in ((1.4, False), (1.0, True)):
         layer = one(0.05, 2.0, 1.4, 2.0, n_below=eta_below)
         R, T = Multipole(layer).totals()
@@ -190,20 +190,20 @@ def test_three_layer_skin_is_red():
 # Quantized diffusion.
 @pytest.mark.parametrize(("sigma_a", "d", "R", "T"), [(0.02, 1, 0.4334, 0.3437), (0.02, 4, 0.5961, 0.1414), (0.1, 1, 0.3161, 0.2322)])
 def test_quantized_diffusion_against_an_analytic_slab(sigma_a, d, R, T):
-    """facts B.5 (c): one-dimensional analytic slab, sigma_s' = 2, eta = 1.4."""
+    """recomputed (c): one-dimensional analytic slab, sigma_s' = 2, eta = 1.4."""
     got = QuantizedDiffusion(one(sigma_a, 2.0, 1.4, d), ratio=1.05).totals()
     np.testing.assert_allclose([got[0][0], got[1][0]], [R, T], rtol=2e-3)
 
 
 @pytest.mark.parametrize(("d", "scattered"), [(2, 0.8647), (4, 0.9817), (8, 0.9997)])
 def test_quantized_diffusion_without_absorption(d, scattered):
-    """facts B.5 (d): R + T = 1 - exp(-mu_t' d): all that scatters at all."""
+    """recomputed (d): R + T = 1 - exp(-mu_t' d): all that scatters at all."""
     assert sum(QuantizedDiffusion(one(0.0, 1.0, 1.4, d), ratio=1.05).totals())[0] == pytest.approx(scattered, rel=2e-3)
 
 
 @pytest.mark.parametrize(("ratio", "total"), [(1.1, 0.23497), (1.2, 0.2346), (1.5, 0.2328), (2.0, 0.2285)])
 def test_quantized_diffusion_of_a_half_space(ratio, total):
-    """facts B.5 (e); 0.23640 for infinitely fine slices. Slices start elsewhere there, which is half a per cent."""
+    """recomputed (e); 0.23640 for infinitely fine slices. Slices start elsewhere there, which is half a per cent."""
     assert QuantizedDiffusion(one(0.1, 0.9, 1.4), ratio=ratio).totals()[0][0] == pytest.approx(total, rel=6e-3)
     assert QuantizedDiffusion(one(0.1, 0.9, 1.4), ratio=1.01).totals()[0][0] == pytest.approx(0.23640, rel=2e-3)
 
@@ -211,7 +211,7 @@ def test_quantized_diffusion_of_a_half_space(ratio, total):
 @pytest.mark.parametrize("m", [-3.0, 0.0, 0.4, 6.0])
 @pytest.mark.parametrize("v", [1e-4, 0.3, 1e3, 1e8])
 def test_weights_are_their_integrals(v, m):
-    """The weights of seeds/004, whose printed forms overflow for large v, against quadrature of what they stand for."""
+    """The weights of BSSRDF notes, whose printed forms overflow for large v, against quadrature of what they stand for."""
     albedo, sigma_t, D, z2 = 0.8, 1.3, 0.3, 4.0
     gauss = lambda z, s=m: np.exp(-((z + s) ** 2) / (2 * v)) / np.sqrt(2 * np.pi * v)  # noqa: E731
     near = [p for p in (-m - 5 * np.sqrt(v), -m, -m + 5 * np.sqrt(v)) if 0 < p < z2]
@@ -222,7 +222,7 @@ def test_weights_are_their_integrals(v, m):
 
 
 def test_slices_are_the_diffusion_kernel():
-    """facts B.5 (a): sum of w_i G_3D(v_i, r) against exp(-mu_tr r) / (4 pi D r): -0.07 % near the source for ratio 1.1."""
+    """recomputed (a): sum of w_i G_3D(v_i, r) against exp(-mu_tr r) / (4 pi D r): -0.07 % near the source for ratio 1.1."""
     mu_a, D, s, first = 0.1, float(grosjean_D(0.1, 0.9)), 1.1, 1e-6
     tau = np.concatenate([[0.0], first * s ** np.arange(220)])
     v, w = D * (tau[1:] + tau[:-1]), (np.exp(-tau[:-1] * mu_a) - np.exp(-tau[1:] * mu_a)) / mu_a
@@ -234,7 +234,7 @@ def test_slices_are_the_diffusion_kernel():
 
 # Single scattering and exact totals.
 def test_single_scattering():
-    """facts B.9.2: all orders less multiple ones, eta = 1: 0.0767, 0.1231, 0.1384, 0.1518 by Monte Carlo."""
+    """recomputed: all orders less multiple ones, eta = 1: 0.0767, 0.1231, 0.1384, 0.1518 by Monte Carlo."""
     stack = Stack.of(Medium((0.5, 0.2, 0.1, 0.01), (0.5, 0.8, 0.9, 0.99), 1.0))
     np.testing.assert_allclose(single.total(stack), (0.0767, 0.1231, 0.1384, 0.1518), atol=5e-4)
     assert single.total(stack)[0] == pytest.approx(0.25 * (1 - np.log(2)), rel=1e-9)
@@ -243,7 +243,7 @@ def test_single_scattering():
 
 
 def test_exact_totals_without_a_boundary():
-    """facts B.7, by Monte Carlo there: light straight down and from everywhere."""
+    """recomputed, by Monte Carlo there: light straight down and from everywhere."""
     alpha = np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998])
     np.testing.assert_allclose(chandrasekhar.searchlight_albedo(alpha), (.0572, .1154, .2087, .2852, .4153, .5357, .6710, .7526, .8176, .8796), atol=1e-3)
     np.testing.assert_allclose(chandrasekhar.diffuse_albedo(alpha), (.0744, .1465, .2562, .3415, .4780, .5968, .7224, .7946, .8502, .9023), atol=1e-3)
@@ -256,7 +256,7 @@ def test_exact_totals_without_a_boundary():
 
 @pytest.mark.parametrize(("eta", "alpha", "total"), [(1.3, 0.9, 0.2909), (1.3, 0.99, 0.6568), (1.4, 0.95, 0.3695), (1.4, 0.99, 0.6210), (1.5, 0.99, 0.5846)])
 def test_saunderson_is_near_monte_carlo(eta, alpha, total):
-    """facts B.9.2."""
+    """recomputed"""
     assert chandrasekhar.surface_albedo(alpha, eta) == pytest.approx(total, rel=0.02)
 
 

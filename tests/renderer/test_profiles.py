@@ -22,7 +22,7 @@ def test_line_integral_is_the_integral_of_the_profile_across():
     assert got == pytest.approx(across, rel=1e-5)
 
 
-# seeds/facts B.16, recomputed there from the six Gaussians: published form and exact form.
+# an independent recomputation, recomputed there from the six Gaussians: published form and exact form.
 @pytest.mark.parametrize("thickness, published, exact", [
     (0.5, (0.4954, 0.0620, 0.0065), (0.5716, 0.1362, 0.0316)),
     (1.0, (0.3047, 0.0046, 0.0012), (0.4063, 0.0197, 0.0029)),
