@@ -157,7 +157,7 @@ class Frame:
         self.view = scene.resolve(scene.FRAMINGS[framing], renderer.model.landmarks, self.width, self.height, renderer.studio)
         self._draw_surfaces()
         self._draw_hair()
-        self._inputs: dict[bool, gl.Texture] = {}
+        self._lit_through: gl.Target | None = None
         gl.finish()
 
     def _lighting(self) -> dict:
@@ -188,7 +188,7 @@ class Frame:
         values = dict(**shared, **where, procedural=int(model.procedural), noise_origin=rng.uniform(100, 900, 3),
                       has_albedo_map=model.skin.albedo_map is not None, has_normal_map=model.skin.normal_map is not None,
                       has_roughness_map=model.skin.roughness_map is not None, base_colour=model.skin.base_colour or (0.5, 0.5, 0.5),
-                      gaussian_variance=np.column_stack([gaussians.SKIN_VARIANCE_MM2, 0.5 / gaussians.SKIN_VARIANCE_MM2]),
+                      gaussian_falloff=0.5 / gaussians.SKIN_VARIANCE_MM2,
                       gaussian_weight=gaussians.SKIN_WEIGHTS, thickness_scale=THICKNESS_SCALE, transmission_wrap=TRANSMISSION_WRAP, **r._maps)
         skin.use(**skin.accepts(values))
         r._skin.draw()
@@ -232,13 +232,12 @@ class Frame:
         """The input of the techniques: irradiance, with the transmitted light of Jimenez 2010 added or not."""
         if not translucent:
             return self.surface.textures[0]
-        if translucent not in self._inputs:
-            target = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
-            target.bind()
+        if self._lit_through is None:
+            self._lit_through = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
+            self._lit_through.bind()
             self.renderer.program("passes/add.frag").use(irradiance=self.surface.textures[0], transmitted=self.surface.textures[4])
             gl.draw_fullscreen(self.renderer.context)
-            self._inputs[translucent] = target
-        return self._inputs[translucent].textures[0]
+        return self._lit_through.textures[0]
 
     def inputs(self, translucent: bool, irradiance: gl.Texture | None = None, depth_normal: gl.Texture | None = None) -> Inputs:
         """What a technique gets; the textures can be replaced (tests use a flat patch)."""
@@ -291,5 +290,5 @@ class Frame:
 
     def close(self) -> None:
         """Free the shared buffers."""
-        for target in (*self._inputs.values(), self.hair, self.surface):
+        for target in filter(None, (self._lit_through, self.hair, self.surface)):
             target.delete()

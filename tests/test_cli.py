@@ -11,18 +11,6 @@ from app import cli
 VERBS = {name: cli.cli.get_command(None, name) for name in cli.VERBS}
 
 
-@pytest.fixture
-def run(capfd, monkeypatch, tmp_path):
-    """Runs the command line in an empty folder and returns its exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*args):
-        code = cli.main([str(arg) for arg in args])
-        return code, *capfd.readouterr()
-
-    return run
-
-
 def test_verbs():
     assert set(VERBS) >= {"render", "build", "power", "serve", "simulate", "analyse"}
 

@@ -9,7 +9,7 @@ uniform int has_albedo_map; uniform int has_normal_map; uniform int has_roughnes
 uniform sampler2D albedo_map; uniform sampler2D normal_map; uniform sampler2D roughness_map;
 uniform vec3 base_colour;
 uniform vec3 noise_origin;           // mm: the seed's place in the solid noise
-uniform vec2 gaussian_variance[6];   // x: variance mm^2, y: 1 / (2 variance) or 1 / variance
+uniform float gaussian_falloff[6];   // 1 / (2 variance), 1/mm^2
 uniform vec3 gaussian_weight[6];
 uniform float thickness_scale;       // mm of skin per mm of depth-map thickness
 uniform float transmission_wrap;
@@ -134,12 +134,11 @@ vec3 transmitted(int lamp, vec3 p, vec3 n) {
     // Jimenez et al. 2010, "Real-time realistic skin translucency", doi:10.1109/MCG.2010.39
     vec3 inner = p - n * 0.6;
     vec3 q = to_lamp(lamp, inner);
-    vec3 axis_x = vec3(lamp_matrix[lamp][0].x, lamp_matrix[lamp][1].x, lamp_matrix[lamp][2].x);
     vec3 total = vec3(0.0);
     for (int k = 0; k < 8; ++k) {
-        float z = lamp_depth(lamp, q.xy + 0.5 * length(axis_x) * 0.7 * vogel(k, 8, 0.0));
+        float z = lamp_depth(lamp, q.xy + lamp_scale(lamp) * 0.7 * vogel(k, 8, 0.0));
         float thickness = max(q.z - z, 0.0) * thickness_scale;
-        for (int j = 0; j < 6; ++j) total += gaussian_weight[j] * exp(-thickness * thickness * gaussian_variance[j].y);
+        for (int j = 0; j < 6; ++j) total += gaussian_weight[j] * exp(-thickness * thickness * gaussian_falloff[j]);
     }
     return total / 8.0 * clamp(transmission_wrap + dot(lamp_direction[lamp], -n), 0.0, 1.0) * lamp_irradiance[lamp];
 }

@@ -21,10 +21,13 @@ vec3 to_lamp(int lamp, vec3 p) {
     return vec3(q.xy * 0.5 + 0.5, q.z);
 }
 
+float lamp_scale(int lamp) {  // uv per mm
+    return 0.5 * length(vec3(lamp_matrix[lamp][0].x, lamp_matrix[lamp][1].x, lamp_matrix[lamp][2].x));
+}
+
 // Visibility of a lamp in [0, 1]: percentage-closer soft shadows (Fernando 2005) over a Vogel disc.
 float visibility(int lamp, vec3 p, vec3 n, float phase) {
-    vec3 axis_x = vec3(lamp_matrix[lamp][0].x, lamp_matrix[lamp][1].x, lamp_matrix[lamp][2].x);
-    float scale = 0.5 * length(axis_x);  // uv per mm
+    float scale = lamp_scale(lamp);
     float slope = clamp(1.0 - dot(n, lamp_direction[lamp]), 0.0, 1.0);
     vec3 q = to_lamp(lamp, p + n * (0.35 + 0.9 * slope));
     float search = 28.0 * lamp_tangent[lamp] * scale;

@@ -158,14 +158,23 @@ class Anatomy:
     lashes: dict[str, np.ndarray]  # helper name -> (K, 3) points
 
 
-def _read_masks(data: Path, uvs: np.ndarray, uv_quads: np.ndarray, quads: np.ndarray, count: int) -> dict[str, np.ndarray]:
-    """MPFB's UV masks sampled (bilinear) at every vertex: name -> (count,) in [0, 1]."""
-    from scipy.ndimage import gaussian_filter, map_coordinates
+def _mask_images(data: Path) -> dict[str, np.ndarray]:
+    """MPFB's UV masks, softened by a texel: name -> (H, W) in [0, 1]."""
+    from scipy.ndimage import gaussian_filter
+
+    images = {}
+    for name in ("lips", "ears", "eyelids", "face", "inside-mouth"):
+        with Image.open(data / "textures" / f"mpfb_{name}.jpg") as file:
+            images[name] = gaussian_filter(np.asarray(file.convert("L"), dtype=np.float32) / 255, 1.0)
+    return images
+
+
+def _sample_masks(images: dict[str, np.ndarray], uvs: np.ndarray, uv_quads: np.ndarray, quads: np.ndarray, count: int) -> dict[str, np.ndarray]:
+    """The masks sampled (bilinear) at every vertex: name -> (count,) in [0, 1]."""
+    from scipy.ndimage import map_coordinates
 
     masks = {}
-    for name in ("lips", "ears", "eyelids", "face", "inside-mouth"):
-        image = np.asarray(Image.open(data / "textures" / f"mpfb_{name}.jpg").convert("L"), dtype=np.float32) / 255
-        image = gaussian_filter(image, 1.0)
+    for name, image in images.items():
         h, w = image.shape
         at = map_coordinates(image, [(1 - uvs[:, 1]) * h - 0.5, uvs[:, 0] * w - 0.5], order=1, mode="nearest")
         mask = np.zeros(count)
@@ -195,7 +204,7 @@ def build_anatomy(data: Path, levels: int = LEVELS) -> Anatomy:
     quads, uv_quads = quads.reshape(-1, 4), uv_quads.reshape(-1, 4)
     points, uvs = shaped[used], base.uvs[uv_used]
 
-    busts, to_fine = [], None
+    busts, to_fine, images = [], None, _mask_images(data)
     for level in range(levels + 1):
         if level:
             smooth, new_quads = subdivide.catmull_clark(quads, len(points))
@@ -204,7 +213,7 @@ def build_anatomy(data: Path, levels: int = LEVELS) -> Anatomy:
             if level > 1:
                 to_fine = smooth if to_fine is None else smooth @ to_fine
         normals = subdivide.vertex_normals(points, subdivide.triangles(quads))
-        masks = _read_masks(data, uvs, uv_quads, quads, len(points))
+        masks = _sample_masks(images, uvs, uv_quads, quads, len(points))
         busts.append(Bust(points, normals, quads, uvs, uv_quads, masks))
 
     lashes = {name: shaped[index] for name, index in base.groups.items() if "eyelashes" in name}

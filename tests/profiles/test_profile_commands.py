@@ -7,24 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from app import cli
 from renderer.medium import Medium, Stack, preset
 from renderer.profiles import judge, models
 from renderer.profiles.chandrasekhar import searchlight_albedo
 
 ALL = ["dipole", "better_dipole", "multipole", "layered", "quantized_diffusion", "burley", "gaussian_sum"]
-
-
-@pytest.fixture
-def run(capfd, monkeypatch, tmp_path):
-    """Runs the command line in an empty folder: exit code, stdout, stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*args):
-        code = cli.main([str(arg) for arg in args])
-        return code, *capfd.readouterr()
-
-    return run
 
 
 def rows(text):
