@@ -1,6 +1,6 @@
 # make demo           install what is missing, render the thesis study, simulate its participants, analyse, serve
 # make demo SERVE=0   the same, but end instead of serving
-# make test           install what is missing, run every test
+# make test           install what is missing, check the style, run every test
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
 # make clean          remove what was built; .venv stays
@@ -23,6 +23,8 @@ setup:
 
 test:
 	@tools/setup test
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
 	.venv/bin/python -m pytest
 
 demo: setup

@@ -1,11 +1,15 @@
-"""How far people agree with themselves and with each other, and whose answers may be left out. Everything on answers oriented to the pair.
+"""How far people agree with themselves and with each other, and whose answers may be left out.
 
-Circular triads: a over b, b over c, c over a, counted over the triads in which all three answers prefer one; zeta = 1 - d/d_max with
-d_max = (n^3 - n)/24 for odd n and (n^3 - 4n)/24 for even n (Kendall and Babington Smith 1940, Biometrika 31, doi:10.2307/2332613).
-'No difference' makes no circle; the guessed variants settle each tie by a fair coin, in expectation, so that whoever sees no difference
-is as consistent as whoever guesses.
-Kendall's u: the pairs of participants who agree, over all, scaled to 1 for perfect agreement and about 0 for chance; a tie is half a
-preference each way. Krippendorff's alpha with his ordinal metric ("Content Analysis", 3rd ed. 2013, section 12.3).
+Everything on answers oriented to the pair.
+
+Circular triads: a over b, b over c, c over a, counted over the triads in which all three answers
+prefer one; zeta = 1 - d/d_max with d_max = (n^3 - n)/24 for odd n and (n^3 - 4n)/24 for even n
+(Kendall and Babington Smith 1940, Biometrika 31, doi:10.2307/2332613). 'No difference' makes no
+circle; the guessed variants settle each tie by a fair coin, in expectation, so that whoever sees no
+difference is as consistent as whoever guesses.
+Kendall's u: the pairs of participants who agree, over all, scaled to 1 for perfect agreement and
+about 0 for chance; a tie is half a preference each way. Krippendorff's alpha with his ordinal
+metric ("Content Analysis", 3rd ed. 2013, section 12.3).
 """
 
 from __future__ import annotations
@@ -18,42 +22,64 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from . import bootstrap, inference, worth
-from .codebook import FRAMING, Codebook
-from .options import FEWEST_PEOPLE, OVERALL, Exclusions, Options
-from .panel import Panel, by_pair, noted, panels
-from .responses import Responses
+from analysis import bootstrap, inference, worth
+from analysis.codebook import FRAMING, Codebook
+from analysis.options import FEWEST_PEOPLE, OVERALL, Exclusions, Options
+from analysis.panel import Panel, by_pair, noted, panels
+from analysis.responses import Responses
 
 PARTICIPANTS = (
-    *("participant", "familiarity", "answers", "left", "none", "right", "side_p", "same_answer_share", "median_rt_ms"),
+    *(
+        "participant",
+        "familiarity",
+        "answers",
+        "left",
+        "none",
+        "right",
+        "side_p",
+        "same_answer_share",
+        "median_rt_ms",
+    ),
     *("circular_triads", "zeta", "repeats", "repeat_share", "agreement_with_others", "excluded"),
 )
-#: Chance with which a one-sided person must be incompatible before `Exclusions.one_side_share` applies.
+#: Chance with which a one-sided person must be incompatible before `Exclusions.one_side_share`
+#: applies.
 ONE_SIDE_P = 0.001
 
 
 def agreement(responses: Responses, options: Options) -> pd.DataFrame:
     """framing, statistic, value, low, high, p; for each framing and 'overall':
 
-    circular_triads             mean a participant, of those who answered every pair; p: fewer than by guessing, one-sided, normal
-                                approximation with the exact mean 1/4 and variance 3/16 of a decided triad (Moran 1947)
+    circular_triads             mean a participant, of those who answered every pair; p: fewer than
+                                by guessing, one-sided, normal approximation with the exact mean 1/4
+                                and variance 3/16 of a decided triad (Moran 1947)
     zeta                        mean coefficient of consistency, at most 1
     circular_triads_guessed, zeta_guessed   the same with ties settled by a fair coin
-    pooled_circular_triads, pooled_zeta     of the majority: whom more answers prefer; not for 'overall'
-    kendall_u                   p: chi-square of Kendall and Babington Smith, df = C(n,2) m (m - 1)/(m - 2)^2; only where everyone
-                                answered every pair and no answer is a tie
-    kendall_u_conditional       the same u; p: by flipping every decided answer by a fair coin, ties kept
-    krippendorff_alpha          ordinal; depends on the order in which pairs are listed, as every ordinal alpha of preferences does
-    krippendorff_alpha_both_ways    the same with every pair listed both ways, which no order changes
-    left_share                  of decided answers, how many prefer the left image; p: signed ranks of participants' right less left
+    pooled_circular_triads, pooled_zeta     of the majority: whom more answers prefer; not for
+                                            'overall'
+    kendall_u                   p: chi-square of Kendall and Babington Smith, df = C(n,2) m (m -
+                                1)/(m - 2)^2; only where everyone answered every pair and no answer
+                                is a tie
+    kendall_u_conditional       the same u; p: by flipping every decided answer by a fair coin, ties
+                                kept
+    krippendorff_alpha          ordinal; depends on the order in which pairs are listed, as every
+                                ordinal alpha of preferences does
+    krippendorff_alpha_both_ways    the same with every pair listed both ways, which no order
+                                    changes
+    left_share                  of decided answers, how many prefer the left image; p: signed ranks
+                                of participants' right less left
     mean_answer                 -2 to 2, negative is left
     side_effect                 of the ordinal model, logits, positive is right; p: Wald's
-    repeat_share                of questions asked again and preferring one both times, how many prefer the same; not for 'overall'
-    repeat_same_answer          of questions asked again, how many got the very same of the five answers
-    median_rt_ms                median of participants' medians, milliseconds; _decided and _none of those answers alone
+    repeat_share                of questions asked again and preferring one both times, how many
+                                prefer the same; not for 'overall'
+    repeat_same_answer          of questions asked again, how many got the very same of the five
+                                answers
+    median_rt_ms                median of participants' medians, milliseconds; _decided and _none of
+                                those answers alone
 
-    Intervals: bootstrap over participants, but for u and alpha, where a person drawn twice would agree with themselves: those are
-    jackknife intervals, one participant left out at a time, with Student's t; side_effect is Wald's.
+    Intervals: bootstrap over participants, but for u and alpha, where a person drawn twice would
+    agree with themselves: those are jackknife intervals, one participant left out at a time, with
+    Student's t; side_effect is Wald's.
     """
     rows, notes = [], bootstrap.few(responses)
     for name, panel in panels(responses).items():
@@ -74,18 +100,36 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
 
     left, none, right       answers by side; side_p: two-sided binomial p of as many left as right
     same_answer_share       how often the most frequent of the five answers was given, 0 to 1
-    circular_triads, zeta   over the framings that were answered in full: the sum and the mean; empty where none was
-    repeats, repeat_share   questions asked again, and how many of those that prefer one both times prefer the same
-    agreement_with_others   cosine, -1 to 1, between the participant's preferences and the sums of everyone else's
+    circular_triads, zeta   over the framings that were answered in full: the sum and the mean;
+                            empty where none was
+    repeats, repeat_share   questions asked again, and how many of those that prefer one both times
+                            prefer the same
+    agreement_with_others   cosine, -1 to 1, between the participant's preferences and the sums of
+                            everyone else's
     excluded                the rules of `Options.exclusions` that apply, '' for none
     """
     frame = responses.frame
     grouped = frame.groupby("participant", observed=True)
-    table = grouped.agg(familiarity=("familiarity", "first"), answers=("answer", "size"), median_rt_ms=("rt_ms", "median"))
-    given = frame.groupby(["participant", "answer"], observed=True).size().unstack(fill_value=0).reindex(columns=range(-2, 3), fill_value=0)
-    table["left"], table["none"], table["right"] = given[-2] + given[-1], given[0], given[1] + given[2]
+    table = grouped.agg(
+        familiarity=("familiarity", "first"),
+        answers=("answer", "size"),
+        median_rt_ms=("rt_ms", "median"),
+    )
+    given = (
+        frame.groupby(["participant", "answer"], observed=True)
+        .size()
+        .unstack(fill_value=0)
+        .reindex(columns=range(-2, 3), fill_value=0)
+    )
+    table["left"], table["none"], table["right"] = (
+        given[-2] + given[-1],
+        given[0],
+        given[1] + given[2],
+    )
     decided = table.left + table.right
-    table["side_p"] = np.minimum(1, 2 * stats.binom.cdf(np.minimum(table.left, table.right), decided, 0.5))
+    table["side_p"] = np.minimum(
+        1, 2 * stats.binom.cdf(np.minimum(table.left, table.right), decided, 0.5)
+    )
     table["same_answer_share"] = given.max(axis=1) / table.answers
 
     parts = list(panels(responses).values())[-1].parts  # of all framings or levels
@@ -101,12 +145,20 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
     table["zeta"] = np.divide(zetas, whole, out=np.full(len(table), np.nan), where=whole > 0)
 
     again = responses.repeats
-    table["repeats"] = again.groupby("participant", observed=True).size().reindex(table.index, fill_value=0) if len(again) else 0
+    table["repeats"] = (
+        again.groupby("participant", observed=True).size().reindex(table.index, fill_value=0)
+        if len(again)
+        else 0
+    )
     both = again[(again.preference != 0) & (again.first_preference != 0)]
-    same = (np.sign(both.preference.astype(int)) == np.sign(both.first_preference.astype(int))).groupby(both.participant, observed=True)
+    same = (
+        np.sign(both.preference.astype(int)) == np.sign(both.first_preference.astype(int))
+    ).groupby(both.participant, observed=True)
     table["repeat_share"] = same.mean().reindex(table.index).astype(float) if len(both) else np.nan
 
-    preference = np.concatenate([np.where(panel.answered, panel.preference, 0) for panel in parts], axis=1).astype(float)
+    preference = np.concatenate(
+        [np.where(panel.answered, panel.preference, 0) for panel in parts], axis=1
+    ).astype(float)
     asked = np.concatenate([panel.answered for panel in parts], axis=1)
     others = (preference.sum(axis=0) - preference) * asked
     length = np.sqrt((preference**2).sum(axis=1) * (others**2).sum(axis=1))
@@ -116,16 +168,22 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
     table = table.reset_index().astype({"participant": object})
     table["excluded"] = _excluded(table, _questions(parts, responses.codebook), options.exclusions)
     table = table[list(PARTICIPANTS)]
-    table.attrs["notes"] = (f"declared exclusions: {_rules(options.exclusions)}; they apply in the table of sensitivity alone",)
+    table.attrs["notes"] = (
+        (
+            f"declared exclusions: {_rules(options.exclusions)}; they apply in the table of "
+            "sensitivity alone"
+        ),
+    )
     return table
 
 
 def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
-    """framing, conclusion, a, b, everyone, without_excluded, changed (0 or 1): what hangs on the declared exclusions.
+    """framing, conclusion, a, b, everyone, without_excluded, changed (0 or 1): what hangs on the
+    declared exclusions.
 
     conclusion  'preferred': the technique of the pair that holm_p < alpha prefers, '' for none
-                'equivalent': '1' or '0', where a margin was declared
-                'first': the technique with the highest bradley_terry worth, '' where there is no fit; a and b are empty
+                'equivalent': '1' or '0', where a margin was declared 'first': the technique with
+                the highest bradley_terry worth, '' where there is no fit; a and b are empty
 
     Without anybody to exclude, and without enough people left, attrs['notes'] say so.
     """
@@ -142,43 +200,59 @@ def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
         frame = responses.frame[~responses.frame.participant.isin(out)].reset_index(drop=True)
         frame = frame.assign(participant=frame.participant.cat.remove_unused_categories())
         rest = _conclusions(replace(responses, frame=frame), lean)
-    rows = [(*key, value, rest.get(key, ""), int(value != rest.get(key, ""))) for key, value in everyone.items()]
+    rows = [
+        (*key, value, rest.get(key, ""), int(value != rest.get(key, "")))
+        for key, value in everyone.items()
+    ]
     return noted(rows, columns, notes)
 
 
 def _conclusions(responses: Responses, options: Options) -> dict[tuple[str, str, str, str], str]:
     found = {}
     for row in inference.pairs(responses, options).itertuples():
-        preferred = (row.b if row.rank_biserial > 0 else row.a) if row.holm_p < 1 - options.level else ""
+        preferred = (
+            (row.b if row.rank_biserial > 0 else row.a) if row.holm_p < 1 - options.level else ""
+        )
         found[row.framing, "preferred", row.a, row.b] = preferred
         if not np.isnan(row.equivalent):
             found[row.framing, "equivalent", row.a, row.b] = f"{row.equivalent:.0f}"
     for name, panel in panels(responses).items():
         worths = worth.estimated(panel, "bradley_terry", options)
-        found[name, "first", "", ""] = "" if np.isnan(worths).any() else panel.items[int(np.argmax(worths))]
+        found[name, "first", "", ""] = (
+            "" if np.isnan(worths).any() else panel.items[int(np.argmax(worths))]
+        )
     return found
 
 
 def _questions(parts: tuple[Panel, ...], codebook: Codebook) -> np.ndarray | int:
-    """How many questions each participant had: all, but for a factor that varies within people, whose levels not everybody need meet."""
+    """How many questions each participant had: all, but for a factor that varies within people,
+    whose levels not everybody need meet.
+    """
     if codebook.factor == FRAMING:
         return sum(len(part.first) for part in parts)
     levels = {part.framing: [one for one in parts if one.framing == part.framing] for part in parts}
     return sum(
-        np.logical_or.reduce([one.answered.any(axis=1) for one in here]) * sum(len(one.first) for one in here) for here in levels.values()
+        np.logical_or.reduce([one.answered.any(axis=1) for one in here])
+        * sum(len(one.first) for one in here)
+        for here in levels.values()
     )
 
 
 def _excluded(table: pd.DataFrame, questions: np.ndarray | int, rules: Exclusions) -> list[str]:
     decided = table.left + table.right
     checks = {
-        "answered_share": rules.answered_share is not None and table.answers < (rules.answered_share or 0) * questions,
+        "answered_share": rules.answered_share is not None
+        and table.answers < (rules.answered_share or 0) * questions,
         "one_side_share": rules.one_side_share is not None
-        and (np.maximum(table.left, table.right) >= (rules.one_side_share or 0) * decided) & (table.side_p < ONE_SIDE_P),
-        "median_rt_ms": rules.median_rt_ms is not None and table.median_rt_ms < (rules.median_rt_ms or 0),
-        "same_answer_share": rules.same_answer_share is not None and table.same_answer_share >= (rules.same_answer_share or 0),
+        and (np.maximum(table.left, table.right) >= (rules.one_side_share or 0) * decided)
+        & (table.side_p < ONE_SIDE_P),
+        "median_rt_ms": rules.median_rt_ms is not None
+        and table.median_rt_ms < (rules.median_rt_ms or 0),
+        "same_answer_share": rules.same_answer_share is not None
+        and table.same_answer_share >= (rules.same_answer_share or 0),
         "zeta": rules.zeta is not None and table.zeta < (rules.zeta or 0),
-        "repeat_share": rules.repeat_share is not None and table.repeat_share < (rules.repeat_share or 0),
+        "repeat_share": rules.repeat_share is not None
+        and table.repeat_share < (rules.repeat_share or 0),
     }
     hits = {name: np.broadcast_to(np.asarray(hit), len(table)) for name, hit in checks.items()}
     return ["; ".join(name for name, hit in hits.items() if hit[row]) for row in range(len(table))]
@@ -193,26 +267,38 @@ def _rules(rules: Exclusions) -> str:
         "zeta": "zeta under {:g}",
         "repeat_share": "under {:.0%} alike when asked again",
     }
-    declared = [text.format(getattr(rules, name)) for name, text in words.items() if getattr(rules, name) is not None]
+    declared = [
+        text.format(getattr(rules, name))
+        for name, text in words.items()
+        if getattr(rules, name) is not None
+    ]
     return ", or ".join(declared) if declared else "no rule is declared"
 
 
-# --- with oneself ------------------------------------------------------------------------------------------------------------------
+# --- with oneself
+# -----------------------------------------------------------------------------
 
 
 def _complete(panel: Panel) -> np.ndarray:
-    """(P,) bool: who answered all n (n - 1)/2 pairs of the panel, where there are at least three techniques."""
+    """(P,) bool: who answered all n (n - 1)/2 pairs of the panel, where there are at least three
+    techniques.
+    """
     n = len(panel.items)
     whole = n >= 3 and len(panel.first) == n * (n - 1) // 2
     return panel.answered.all(axis=1) if whole else np.zeros(len(panel.participants), bool)
 
 
 def triads(panel: Panel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(P,) each: circular triads, triads without a tie, and circular triads expected when a fair coin settles ties."""
+    """(P,) each: circular triads, triads without a tie, and circular triads expected when a fair
+    coin settles ties.
+    """
     n = len(panel.items)
     sign = np.zeros((len(panel.participants), n, n), np.int8)
     given = np.sign(np.where(panel.answered, panel.preference, 0))
-    sign[:, panel.first, panel.second], sign[:, panel.second, panel.first] = -given, given  # 1: the row is preferred
+    sign[:, panel.first, panel.second], sign[:, panel.second, panel.first] = (
+        -given,
+        given,
+    )  # 1: the row is preferred
     circular, decided, guessed = (np.zeros(len(sign)) for _ in range(3))
     for i, j, k in combinations(range(n), 3):
         round_trip = np.stack([sign[:, i, j], sign[:, j, k], sign[:, k, i]])
@@ -227,12 +313,18 @@ def zeta(circular: np.ndarray, n: int) -> np.ndarray:
     return 1 - np.asarray(circular) / ((n**3 - n) / 24 if n % 2 else (n**3 - 4 * n) / 24)
 
 
-def _consistency(name: str, parts: tuple[Panel, ...], options: Options, notes: list[str]) -> list[tuple]:
+def _consistency(
+    name: str, parts: tuple[Panel, ...], options: Options, notes: list[str]
+) -> list[tuple]:
     labels = ("circular_triads", "zeta", "circular_triads_guessed", "zeta_guessed")
     full = [_complete(panel) for panel in parts]
     people = np.logical_or.reduce(full)
     if not people.any():
-        why = "fewer than three techniques" if all(len(panel.items) < 3 for panel in parts) else "nobody answered every pair"
+        why = (
+            "fewer than three techniques"
+            if all(len(panel.items) < 3 for panel in parts)
+            else "nobody answered every pair"
+        )
         notes.append(f"{name}: no circular triads: {why}")
         return [(label, np.nan, np.nan, np.nan, np.nan) for label in labels]
     sums = np.zeros((len(people), 4))
@@ -249,9 +341,14 @@ def _consistency(name: str, parts: tuple[Panel, ...], options: Options, notes: l
     values = sums[people]
     draws = bootstrap.totals(values, options) / len(values)
     low, high = bootstrap.interval(draws, len(values), options.level)
-    p = float(stats.norm.cdf((seen - decided / 4) / np.sqrt(3 * decided / 16))) if decided else np.nan
+    p = (
+        float(stats.norm.cdf((seen - decided / 4) / np.sqrt(3 * decided / 16)))
+        if decided
+        else np.nan
+    )
     return [
-        (label, values[:, k].mean(), low[k], high[k], p if label == "circular_triads" else np.nan) for k, label in enumerate(labels)
+        (label, values[:, k].mean(), low[k], high[k], p if label == "circular_triads" else np.nan)
+        for k, label in enumerate(labels)
     ]
 
 
@@ -259,31 +356,53 @@ def _pooled(panel: Panel) -> list[tuple]:
     n = len(panel.items)
     counts = by_pair(panel, panel.counts)
     if n < 3 or not counts.any(axis=1).all():
-        return [(label, np.nan, np.nan, np.nan, np.nan) for label in ("pooled_circular_triads", "pooled_zeta")]
+        return [
+            (label, np.nan, np.nan, np.nan, np.nan)
+            for label in ("pooled_circular_triads", "pooled_zeta")
+        ]
     majority = np.sign(counts[:, 3:].sum(axis=1) - counts[:, :2].sum(axis=1)).astype(np.int8)[None]
-    one = Panel(panel.framing, panel.items, panel.participants[:1], *np.triu_indices(n, 1), majority, majority == 0)
+    one = Panel(
+        panel.framing,
+        panel.items,
+        panel.participants[:1],
+        *np.triu_indices(n, 1),
+        majority,
+        majority == 0,
+    )
     circular = triads(one)[0][0]
-    return [("pooled_circular_triads", circular, np.nan, np.nan, np.nan), ("pooled_zeta", zeta(circular, n), np.nan, np.nan, np.nan)]
+    return [
+        ("pooled_circular_triads", circular, np.nan, np.nan, np.nan),
+        ("pooled_zeta", zeta(circular, n), np.nan, np.nan, np.nan),
+    ]
 
 
-# --- with each other ---------------------------------------------------------------------------------------------------------------
+# --- with each other
+# -----------------------------------------------------------------------------
 
 
 def kendall_u(counts: np.ndarray) -> np.ndarray:
-    """counts (..., K, 5) -> (...): Kendall's u, a tie counted as half a preference each way; NaN below two answers a pair.
+    """counts (..., K, 5) -> (...): Kendall's u, a tie counted as half a preference each way; NaN
+    below two answers a pair.
 
-    With m answers to every pair: u = 2 S/(C(m,2) C(n,2)) - 1, S the sum over pairs and directions of C(times preferred, 2).
+    With m answers to every pair: u = 2 S/(C(m,2) C(n,2)) - 1, S the sum over pairs and directions
+    of C(times preferred, 2).
     """
     half = counts[..., 2] / 2
     over, under = counts[..., 0] + counts[..., 1] + half, counts[..., 3] + counts[..., 4] + half
     m = over + under
     alike = (over * (over - 1) + under * (under - 1)) / 2
     share = np.divide(alike, m * (m - 1) / 2, out=np.full(m.shape, np.nan), where=m > 1)
-    return 2 * np.nanmean(share, axis=-1) - 1 if np.isfinite(share).any() else np.full(m.shape[:-1], np.nan)
+    return (
+        2 * np.nanmean(share, axis=-1) - 1
+        if np.isfinite(share).any()
+        else np.full(m.shape[:-1], np.nan)
+    )
 
 
 def kendall_test(counts: np.ndarray, items: int) -> tuple[float, float, float]:
-    """counts (K, 5) without ties, the same number m > 2 of answers to each pair -> chi-square, its degrees of freedom, p."""
+    """counts (K, 5) without ties, the same number m > 2 of answers to each pair -> chi-square, its
+    degrees of freedom, p.
+    """
     over, under = counts[:, :2].sum(axis=1), counts[:, 3:].sum(axis=1)
     m, pairs = (over + under)[0], items * (items - 1) / 2
     alike = ((over * (over - 1) + under * (under - 1)) / 2).sum()
@@ -293,22 +412,33 @@ def kendall_test(counts: np.ndarray, items: int) -> tuple[float, float, float]:
 
 
 def krippendorff_alpha(counts: np.ndarray) -> np.ndarray:
-    """counts (..., K, 5), answers of each value to each unit -> (...): ordinal alpha; NaN where all answers are alike."""
+    """counts (..., K, 5), answers of each value to each unit -> (...): ordinal alpha; NaN where all
+    answers are alike.
+    """
     n = counts.sum(axis=-1)
     weight = np.divide(1.0, n - 1, out=np.zeros(n.shape), where=n > 1)
     pairs = np.einsum("...kc,...kd,...k->...cd", counts, counts, weight, optimize=True)
     pairs[..., range(5), range(5)] -= np.einsum("...kc,...k->...c", counts, weight)
     totals = pairs.sum(axis=-1)
-    below = np.cumsum(totals, axis=-1) - totals / 2  # mid-ranks: the sum from c to d, less half of each end, is their difference
+    below = (
+        np.cumsum(totals, axis=-1) - totals / 2
+    )  # mid-ranks: the sum from c to d, less half of each end, is their difference
     distance = (below[..., :, None] - below[..., None, :]) ** 2
     observed = (pairs * distance).sum(axis=(-2, -1))
     expected = (totals[..., :, None] * totals[..., None, :] * distance).sum(axis=(-2, -1))
     size = totals.sum(axis=-1)
-    return 1 - (size - 1) * np.divide(observed, expected, out=np.full(observed.shape, np.nan), where=expected > 0)
+    return 1 - (size - 1) * np.divide(
+        observed, expected, out=np.full(observed.shape, np.nan), where=expected > 0
+    )
 
 
 def _concordance(name: str, panel: Panel, options: Options, notes: list[str]) -> list[tuple]:
-    labels = ("kendall_u", "kendall_u_conditional", "krippendorff_alpha", "krippendorff_alpha_both_ways")
+    labels = (
+        "kendall_u",
+        "kendall_u_conditional",
+        "krippendorff_alpha",
+        "krippendorff_alpha_both_ways",
+    )
     counts = panel.counts
     here = panel.answered.any(axis=1)
     if here.sum() < 2:
@@ -318,11 +448,15 @@ def _concordance(name: str, panel: Panel, options: Options, notes: list[str]) ->
     n = counts.sum(axis=1)
     p = np.nan
     if (n == here.sum()).all() and not counts[:, 2].any() and here.sum() > 2:
-        # 'overall' has its pairs once a framing: C(n,2) of them in the formula are as many as there are questions
+        # 'overall' has its pairs once a framing: C(n,2) of them in the formula are as many as there
+        # are questions
         pairs = len(panel.first)
         p = kendall_test(counts, (1 + np.sqrt(1 + 8 * pairs)) / 2)[2]
     else:
-        notes.append(f"{name}: kendall_u has no chi-square test with ties or missing answers; see kendall_u_conditional")
+        notes.append(
+            f"{name}: kendall_u has no chi-square test with ties or missing answers; see "
+            "kendall_u_conditional"
+        )
     u = float(kendall_u(counts))
     bounds = _jackknife(u, kendall_u(left_out), options.level)
     both, both_out = (np.concatenate([one, one[..., ::-1]], axis=-2) for one in (counts, left_out))
@@ -332,8 +466,18 @@ def _concordance(name: str, panel: Panel, options: Options, notes: list[str]) ->
     return [
         ("kendall_u", u, *bounds, p),
         ("kendall_u_conditional", u, *bounds, _coin_test(counts, u, options)),
-        ("krippendorff_alpha", alpha, *_jackknife(alpha, krippendorff_alpha(left_out), options.level), np.nan),
-        ("krippendorff_alpha_both_ways", alpha_both, *_jackknife(alpha_both, krippendorff_alpha(both_out), options.level), np.nan),
+        (
+            "krippendorff_alpha",
+            alpha,
+            *_jackknife(alpha, krippendorff_alpha(left_out), options.level),
+            np.nan,
+        ),
+        (
+            "krippendorff_alpha_both_ways",
+            alpha_both,
+            *_jackknife(alpha_both, krippendorff_alpha(both_out), options.level),
+            np.nan,
+        ),
     ]
 
 
@@ -359,20 +503,35 @@ def _jackknife(value: float, left_out: np.ndarray, level: float) -> tuple[float,
     return value - half, value + half
 
 
-# --- sides, repeats, times ---------------------------------------------------------------------------------------------------------
+# --- sides, repeats, times
+# -----------------------------------------------------------------------------
 
 
 def _sides(name: str, panel: Panel, options: Options, notes: list[str]) -> list[tuple]:
-    answer = np.where(panel.answered, np.where(panel.first_left, 1, -1) * panel.preference, 0).astype(float)
+    answer = np.where(
+        panel.answered, np.where(panel.first_left, 1, -1) * panel.preference, 0
+    ).astype(float)
     here = panel.answered.any(axis=1)
     left, right = (answer < 0).sum(axis=1), (answer > 0).sum(axis=1)
-    columns = np.column_stack([left, left + right, answer.sum(axis=1), panel.answered.sum(axis=1)]).astype(float)[here]
+    columns = np.column_stack(
+        [left, left + right, answer.sum(axis=1), panel.answered.sum(axis=1)]
+    ).astype(float)[here]
     sums = np.vstack([columns.sum(axis=0), bootstrap.totals(columns, options)])
     share = np.divide(sums[:, 0], sums[:, 1], out=np.full(len(sums), np.nan), where=sums[:, 1] > 0)
     mean = sums[:, 2] / sums[:, 3]
     rows = [
-        ("left_share", share[0], *bootstrap.interval(share[1:], len(columns), options.level), inference.signed_rank((right - left)[here])[0]),
-        ("mean_answer", mean[0], *bootstrap.interval(mean[1:], len(columns), options.level), np.nan),
+        (
+            "left_share",
+            share[0],
+            *bootstrap.interval(share[1:], len(columns), options.level),
+            inference.signed_rank((right - left)[here])[0],
+        ),
+        (
+            "mean_answer",
+            mean[0],
+            *bootstrap.interval(mean[1:], len(columns), options.level),
+            np.nan,
+        ),
     ]
     if "ordinal" not in options.models:
         return rows
@@ -385,7 +544,9 @@ def _sides(name: str, panel: Panel, options: Options, notes: list[str]) -> list[
     return [*rows, ("side_effect", fit.side, fit.side - half, fit.side + half, p)]
 
 
-def _repeats(name: str, responses: Responses, panel: Panel, options: Options, notes: list[str]) -> list[tuple]:
+def _repeats(
+    name: str, responses: Responses, panel: Panel, options: Options, notes: list[str]
+) -> list[tuple]:
     again = responses.repeats
     again = again if name == OVERALL else again[again.framing == name]
     labels = ("repeat_share", "repeat_same_answer")
@@ -394,28 +555,52 @@ def _repeats(name: str, responses: Responses, panel: Panel, options: Options, no
         return [(label, np.nan, np.nan, np.nan, np.nan) for label in labels]
     later, first = again.preference.to_numpy(int), again.first_preference.to_numpy(int)
     both = (later != 0) & (first != 0)
-    columns = np.column_stack([both & (np.sign(later) == np.sign(first)), both, later == first, np.ones(len(later))])
-    people = pd.DataFrame(columns.astype(float)).groupby(again.participant.astype(object).to_numpy()).sum().to_numpy()
+    columns = np.column_stack(
+        [both & (np.sign(later) == np.sign(first)), both, later == first, np.ones(len(later))]
+    )
+    people = (
+        pd.DataFrame(columns.astype(float))
+        .groupby(again.participant.astype(object).to_numpy())
+        .sum()
+        .to_numpy()
+    )
     sums = np.vstack([people.sum(axis=0), bootstrap.totals(people, options)])
     rows = []
     for label, top, bottom in zip(labels, (0, 2), (1, 3), strict=True):
-        share = np.divide(sums[:, top], sums[:, bottom], out=np.full(len(sums), np.nan), where=sums[:, bottom] > 0)
-        rows.append((label, share[0], *bootstrap.interval(share[1:], len(people), options.level), np.nan))
+        share = np.divide(
+            sums[:, top], sums[:, bottom], out=np.full(len(sums), np.nan), where=sums[:, bottom] > 0
+        )
+        rows.append(
+            (label, share[0], *bootstrap.interval(share[1:], len(people), options.level), np.nan)
+        )
     return rows
 
 
 def _times(name: str, responses: Responses, panel: Panel, options: Options) -> list[tuple]:
     frame = responses.frame
     here = slice(None) if name == OVERALL else (frame.framing == name).to_numpy()
-    table = pd.DataFrame({"who": frame.participant.cat.codes.to_numpy(), "ms": frame.rt_ms.to_numpy()})[here]
+    table = pd.DataFrame(
+        {"who": frame.participant.cat.codes.to_numpy(), "ms": frame.rt_ms.to_numpy()}
+    )[here]
     none = (frame.strength == 0).to_numpy()[here]
     rows = []
-    kinds: Mapping[str, object] = {"median_rt_ms": slice(None), "median_rt_ms_decided": ~none, "median_rt_ms_none": none}
+    kinds: Mapping[str, object] = {
+        "median_rt_ms": slice(None),
+        "median_rt_ms_decided": ~none,
+        "median_rt_ms_none": none,
+    }
     for label, chosen in kinds.items():
         medians = np.sort(table[chosen].groupby("who").ms.median().to_numpy())
         if not len(medians):
             rows.append((label, np.nan, np.nan, np.nan, np.nan))
             continue
         draws = bootstrap.medians(medians, options)
-        rows.append((label, float(np.median(medians)), *bootstrap.interval(draws, len(medians), options.level), np.nan))
+        rows.append(
+            (
+                label,
+                float(np.median(medians)),
+                *bootstrap.interval(draws, len(medians), options.level),
+                np.nan,
+            )
+        )
     return rows

@@ -1,6 +1,8 @@
-"""Analytic Hierarchy Process with one criterion: from judgements of pairs to priorities and their consistency.
+"""Analytic Hierarchy Process with one criterion: from judgements of pairs to priorities and their
+consistency.
 
-T. L. Saaty, "The Analytic Hierarchy Process", McGraw-Hill 1980; as used in section 5.3 of Vuletic's thesis.
+T. L. Saaty, "The Analytic Hierarchy Process", McGraw-Hill 1980; as used in section 5.3 of Vuletic's
+thesis.
 """
 
 from __future__ import annotations
@@ -14,13 +16,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from . import bootstrap
-from .errors import InputError
-from .options import Options
-from .panel import Panel, by_pair, noted, panels
-from .responses import Responses
+from analysis import bootstrap
+from analysis.errors import InputError
+from analysis.options import Options
+from analysis.panel import Panel, by_pair, noted, panels
+from analysis.responses import Responses
 
-#: Random index for matrices of 1 to 10 items; Saaty's, as in table 5.3 of the thesis. Other tools hold others (n = 3: .525, .58).
+#: Random index for matrices of 1 to 10 items; Saaty's, as in table 5.3 of the thesis. Other tools
+#: hold others (n = 3: .525, .58).
 RANDOM_INDEX = (0.0, 0.0, 0.52, 0.90, 1.12, 1.24, 1.32, 1.41, 1.45, 1.49)
 #: How far a_ik * a_ki may be from 1 in a matrix that was printed with few digits.
 RECIPROCAL_TOLERANCE = 0.02
@@ -41,12 +44,18 @@ class Comparison:
     @property
     def missing(self) -> list[tuple[str, str]]:
         """The pairs that nobody compared."""
-        return [(a, b) for (i, a), (k, b) in combinations(enumerate(self.items), 2) if np.isnan(self.matrix[i, k])]
+        return [
+            (a, b)
+            for (i, a), (k, b) in combinations(enumerate(self.items), 2)
+            if np.isnan(self.matrix[i, k])
+        ]
 
 
 @dataclass(frozen=True)
 class Priorities:
-    """vector (n,) sums to 1; ci = (lambda_max - n)/(n - 1); cr = ci / RI, None beyond 10 items, where there is no RI."""
+    """vector (n,) sums to 1; ci = (lambda_max - n)/(n - 1); cr = ci / RI, None beyond 10 items,
+    where there is no RI.
+    """
 
     vector: np.ndarray
     lambda_max: float
@@ -63,27 +72,35 @@ class Priorities:
 
 
 def judgements(preference: np.ndarray) -> np.ndarray:
-    """Preferences, -2 (strong for a) to 2 (strong for b), as judgements of a over b: 3, 2, 1, 1/2, 1/3."""
+    """Preferences, -2 (strong for a) to 2 (strong for b), as judgements of a over b: 3, 2, 1, 1/2,
+    1/3.
+    """
     preference = np.asarray(preference)
     scale = 1.0 + np.abs(preference)
     return np.where(preference > 0, 1 / scale, scale)
 
 
 def medians(responses: Responses) -> pd.DataFrame:
-    """framing, a, b, n, median_preference (-2 to 2, negative prefers a), median_judgement (of a over b), one row a pair.
+    """framing, a, b, n, median_preference (-2 to 2, negative prefers a), median_judgement (of a
+    over b), one row a pair.
 
     a comes before b in the order of techniques: this is the triangle above the diagonal.
     """
     frame = responses.frame
-    frame = frame[["framing", "a", "b", "preference"]].assign(judgement=judgements(frame.preference))
+    frame = frame[["framing", "a", "b", "preference"]].assign(
+        judgement=judgements(frame.preference)
+    )
     table = frame.groupby(["framing", "a", "b"], observed=True).agg(
-        n=("preference", "size"), median_preference=("preference", "median"), median_judgement=("judgement", "median")
+        n=("preference", "size"),
+        median_preference=("preference", "median"),
+        median_judgement=("judgement", "median"),
     )
     return table.reset_index().astype(dict.fromkeys(("framing", "a", "b"), object))
 
 
 def comparisons(responses: Responses) -> dict[str, Comparison]:
-    """Framing -> matrix of medians, taken above the diagonal in the order of techniques and inverted below.
+    """Framing -> matrix of medians, taken above the diagonal in the order of techniques and
+    inverted below.
 
     The order matters: the median of 1 and 2 is 1.5, and 0.75 the other way, which is not 1/1.5.
     """
@@ -100,11 +117,16 @@ def comparisons(responses: Responses) -> dict[str, Comparison]:
 
 
 def priorities(matrix: np.ndarray) -> Priorities:
-    """The principal eigenvector of a positive matrix (n, n), scaled to sum 1, and its consistency."""
+    """The principal eigenvector of a positive matrix (n, n), scaled to sum 1,
+    and its consistency.
+    """
     matrix = np.asarray(matrix, float)
     n = len(matrix)
     if matrix.shape != (n, n) or n == 0 or not (np.isfinite(matrix) & (matrix > 0)).all():
-        raise InputError(f"a matrix of shape {matrix.shape} has no priorities; expected it square, complete and positive")
+        raise InputError(
+            f"a matrix of shape {matrix.shape} has no priorities; expected it square, "
+            "complete and positive"
+        )
     values, vectors = np.linalg.eig(matrix)
     principal = np.argmax(values.real)
     vector = np.abs(vectors[:, principal].real)
@@ -118,7 +140,9 @@ def priorities(matrix: np.ndarray) -> Priorities:
 
 
 def priorities_table(comparisons: Mapping[str, Comparison]) -> pd.DataFrame:
-    """framing, technique, priority, lambda_max, ci, cr; empty numbers where a framing's pairs are incomplete."""
+    """framing, technique, priority, lambda_max, ci, cr; empty numbers where a framing's pairs are
+    incomplete.
+    """
     rows = []
     for framing, comparison in comparisons.items():
         if comparison.missing:
@@ -130,20 +154,26 @@ def priorities_table(comparisons: Mapping[str, Comparison]) -> pd.DataFrame:
             (framing, name, priority, found.lambda_max, found.ci, cr)
             for name, priority in zip(comparison.items, found.vector, strict=True)
         ]
-    return pd.DataFrame(rows, columns=["framing", "technique", "priority", "lambda_max", "ci", "cr"])
+    return pd.DataFrame(
+        rows, columns=["framing", "technique", "priority", "lambda_max", "ci", "cr"]
+    )
 
 
 def row_geometric_mean(matrix: np.ndarray) -> np.ndarray:
-    """matrix (..., n, n) -> (..., n): the geometric mean of each row, scaled to sum 1 (Crawford and Williams 1985)."""
+    """matrix (..., n, n) -> (..., n): the geometric mean of each row, scaled to sum 1 (Crawford and
+    Williams 1985).
+    """
     logs = np.log(np.asarray(matrix, float)).mean(axis=-1)
     weight = np.exp(logs - logs.max(axis=-1, keepdims=True))
     return weight / weight.sum(axis=-1, keepdims=True)
 
 
 def look_again(comparison: Comparison) -> tuple[str, str, float, float] | None:
-    """a, b, the judgement of a over b, and what the other judgements imply: the one that departs most from the priorities.
+    """a, b, the judgement of a over b, and what the other judgements imply: the one that departs
+    most from the priorities.
 
-    The largest |log(a_ij w_j/w_i)| (Saaty 2003, doi:10.1016/S0377-2217(02)00227-8); None where all agree or a pair is missing.
+    The largest |log(a_ij w_j/w_i)| (Saaty 2003, doi:10.1016/S0377-2217(02)00227-8); None where all
+    agree or a pair is missing.
     """
     if comparison.missing or len(comparison.items) < 3:
         return None
@@ -153,13 +183,20 @@ def look_again(comparison: Comparison) -> tuple[str, str, float, float] | None:
     i, j = np.unravel_index(np.argmax(off), off.shape)
     if off[i, j] < 1e-9:
         return None
-    return comparison.items[i], comparison.items[j], float(comparison.matrix[i, j]), float(implied[i, j])
+    return (
+        comparison.items[i],
+        comparison.items[j],
+        float(comparison.matrix[i, j]),
+        float(implied[i, j]),
+    )
 
 
 def aggregated(panel: Panel, counts: np.ndarray, aggregation: str) -> np.ndarray:
-    """counts (..., K, 5) -> (..., n, n): matrices of 'median' or 'geometric_mean' judgements, NaN where a pair has no answer.
+    """counts (..., K, 5) -> (..., n, n): matrices of 'median' or 'geometric_mean' judgements, NaN
+    where a pair has no answer.
 
-    The median is taken above the diagonal and inverted below, as in `comparisons`; the geometric mean needs no such rule.
+    The median is taken above the diagonal and inverted below, as in `comparisons`; the geometric
+    mean needs no such rule.
     """
     counts = by_pair(panel, counts)
     scale = judgements(np.arange(-2, 3))
@@ -167,7 +204,9 @@ def aggregated(panel: Panel, counts: np.ndarray, aggregation: str) -> np.ndarray
         above = bootstrap.median(counts, scale)
     else:
         n = counts.sum(axis=-1)
-        above = np.exp(np.divide(counts @ np.log(scale), n, out=np.full(n.shape, np.nan), where=n > 0))
+        above = np.exp(
+            np.divide(counts @ np.log(scale), n, out=np.full(n.shape, np.nan), where=n > 0)
+        )
     items = len(panel.items)
     i, j = np.triu_indices(items, 1)
     matrix = np.ones((*above.shape[:-1], items, items))
@@ -176,9 +215,11 @@ def aggregated(panel: Panel, counts: np.ndarray, aggregation: str) -> np.ndarray
 
 
 def priority_intervals(responses: Responses, options: Options) -> pd.DataFrame:
-    """framing, aggregation, method, technique, priority, low, high; empty numbers where a pair has no answer.
+    """framing, aggregation, method, technique, priority, low, high; empty numbers where a pair has
+    no answer.
 
-    aggregation: 'median' (the thesis's) or 'geometric_mean' of people's judgements; method: 'eigenvector' or 'row_geometric_mean'.
+    aggregation: 'median' (the thesis's) or 'geometric_mean' of people's judgements; method:
+    'eigenvector' or 'row_geometric_mean'.
     """
     rows, notes = [], bootstrap.few(responses)
     for name, panel in panels(responses).items():
@@ -186,42 +227,77 @@ def priority_intervals(responses: Responses, options: Options) -> pd.DataFrame:
             matrix, drawn = _matrices(panel, aggregation, options)
             if np.isnan(matrix).any():
                 notes.append(f"{name}: no priorities: a pair has no answer")
-            for method, solve in (("eigenvector", lambda one: _principal(one)[0]), ("row_geometric_mean", row_geometric_mean)):
+            for method, solve in (
+                ("eigenvector", lambda one: _principal(one)[0]),
+                ("row_geometric_mean", row_geometric_mean),
+            ):
                 low, high = bootstrap.interval(solve(drawn), panel.people, options.level)
                 values = zip(panel.items, solve(matrix), low, high, strict=True)
                 rows += [(name, aggregation, method, *value) for value in values]
-    return noted(rows, ["framing", "aggregation", "method", "technique", "priority", "low", "high"], notes)
+    return noted(
+        rows, ["framing", "aggregation", "method", "technique", "priority", "low", "high"], notes
+    )
 
 
 def consistency_intervals(responses: Responses, options: Options) -> pd.DataFrame:
     """framing, aggregation, ci, ci_low, ci_high, cr, cr_low, cr_high, a, b, judgement, consistent.
 
-    a, b, judgement, consistent: where CR is at least 0.1, the judgement to look at again and what the others imply; else empty.
-    cr is empty beyond 10 techniques, where there is no random index.
+    a, b, judgement, consistent: where CR is at least 0.1, the judgement to look at again and what
+    the others imply; else empty. cr is empty beyond 10 techniques, where there is no random index.
     """
-    columns = ["framing", "aggregation", "ci", "ci_low", "ci_high", "cr", "cr_low", "cr_high", "a", "b", "judgement", "consistent"]
+    columns = [
+        "framing",
+        "aggregation",
+        "ci",
+        "ci_low",
+        "ci_high",
+        "cr",
+        "cr_low",
+        "cr_high",
+        "a",
+        "b",
+        "judgement",
+        "consistent",
+    ]
     rows, notes = [], bootstrap.few(responses)
     for name, panel in panels(responses).items():
         n = len(panel.items)
         index = RANDOM_INDEX[n - 1] if n <= len(RANDOM_INDEX) else np.nan
         if n > len(RANDOM_INDEX):
-            notes.append(f"{name}: no consistency ratio: there is no random index beyond {len(RANDOM_INDEX)} items, got {n}")
+            notes.append(
+                f"{name}: no consistency ratio: there is no random index beyond "
+                f"{len(RANDOM_INDEX)} items, got {n}"
+            )
         for aggregation in AGGREGATIONS:
             matrix, drawn = _matrices(panel, aggregation, options)
             ci = _index(matrix)
             bounds = bootstrap.interval(_index(drawn), panel.people, options.level)
             ratio = [float(one) / index if index else float(one) for one in (ci, *bounds)]
             again = look_again(Comparison(panel.items, matrix)) if ratio[0] >= 0.1 else None
-            rows.append((name, aggregation, float(ci), *map(float, bounds), *ratio, *(again or ("", "", np.nan, np.nan))))
+            rows.append(
+                (
+                    name,
+                    aggregation,
+                    float(ci),
+                    *map(float, bounds),
+                    *ratio,
+                    *(again or ("", "", np.nan, np.nan)),
+                )
+            )
     return noted(rows, columns, notes)
 
 
 def _matrices(panel: Panel, aggregation: str, options: Options) -> tuple[np.ndarray, np.ndarray]:
-    return tuple(aggregated(panel, counts, aggregation) for counts in (panel.counts, bootstrap.counts(panel, options)))
+    return tuple(
+        aggregated(panel, counts, aggregation)
+        for counts in (panel.counts, bootstrap.counts(panel, options))
+    )
 
 
 def _principal(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """matrix (..., n, n) -> principal eigenvectors (..., n), sum 1, and eigenvalues (...); NaN where a matrix has one."""
+    """matrix (..., n, n) -> principal eigenvectors (..., n), sum 1, and eigenvalues (...); NaN
+    where a matrix has one.
+    """
     whole = np.isfinite(matrix).all(axis=(-2, -1))
     values, vectors = np.linalg.eig(np.where(whole[..., None, None], matrix, 1.0))
     top = np.argmax(values.real, axis=-1)[..., None]
@@ -239,7 +315,9 @@ def _index(matrix: np.ndarray) -> np.ndarray:
 
 
 def read_matrices(path: str | Path) -> dict[str, Comparison]:
-    """Framing -> matrix, from a TOML file: `items = [names]`, then for each framing `[matrix.NAME]` with `rows = [[...]]`."""
+    """Framing -> matrix, from a TOML file: `items = [names]`, then for each framing `[matrix.NAME]`
+    with `rows = [[...]]`.
+    """
     path = Path(path)
     try:
         table = tomllib.loads(path.read_text("utf-8"))
@@ -257,7 +335,9 @@ def read_matrices(path: str | Path) -> dict[str, Comparison]:
         raise InputError(f"{path}: items is {items!r:.60}, expected a list of different names")
     matrices = table.get("matrix")
     if not isinstance(matrices, dict) or not matrices:
-        raise InputError(f"{path}: matrix is {matrices!r:.60}, expected a table [matrix.NAME] for each framing")
+        raise InputError(
+            f"{path}: matrix is {matrices!r:.60}, expected a table [matrix.NAME] for each framing"
+        )
     return {
         framing: Comparison(tuple(items), _matrix(f"{path}: matrix.{framing}", entry, items))
         for framing, entry in matrices.items()
@@ -269,7 +349,9 @@ def _matrix(name: str, entry: object, items: Sequence[str]) -> np.ndarray:
     rows = entry.get("rows") if isinstance(entry, dict) else None
     if not isinstance(rows, list) or len(rows) != len(items):
         got = f"{len(rows)} rows" if isinstance(rows, list) else f"{rows!r:.60}"
-        raise InputError(f"{name}.rows is {got}, expected {len(items)} rows, one for each of the items")
+        raise InputError(
+            f"{name}.rows is {got}, expected {len(items)} rows, one for each of the items"
+        )
     for i, row in enumerate(rows):
         if not isinstance(row, list) or len(row) != len(items):
             got = f"{len(row)} numbers" if isinstance(row, list) else f"{row!r:.60}"
@@ -277,13 +359,17 @@ def _matrix(name: str, entry: object, items: Sequence[str]) -> np.ndarray:
         for k, value in enumerate(row):
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if not number or not 0 < value < float("inf"):
-                raise InputError(f"{name}.rows[{i}][{k}] is {value!r:.60}, expected a positive number")
+                raise InputError(
+                    f"{name}.rows[{i}][{k}] is {value!r:.60}, expected a positive number"
+                )
     matrix = np.array(rows, float)
     off = np.abs(matrix * matrix.T - 1)
     if off.max() > RECIPROCAL_TOLERANCE:
         i, k = np.unravel_index(np.argmax(off), off.shape)
         raise InputError(
-            f"{name} is not reciprocal: {items[i]} over {items[k]} is {matrix[i, k]:g} and the other way {matrix[k, i]:g}, "
-            f"their product is {matrix[i, k] * matrix[k, i]:g}, expected 1 within {RECIPROCAL_TOLERANCE}"
+            f"{name} is not reciprocal: {items[i]} over {items[k]} is {matrix[i, k]:g} and "
+            f"the other way {matrix[k, i]:g}, "
+            f"their product is {matrix[i, k] * matrix[k, i]:g}, expected 1 within "
+            f"{RECIPROCAL_TOLERANCE}"
         )
     return matrix

@@ -1,4 +1,5 @@
-"""What the names in a response table mean: which framings and techniques there are, in which order, with which labels.
+"""What the names in a response table mean: which framings and techniques there are, in which order,
+with which labels.
 
 A codebook comes from a study's `manifest.json`, or, without one, from the table itself.
 """
@@ -10,22 +11,26 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from .errors import InputError
+from analysis.errors import InputError
 
 MANIFEST_FORMAT = "subdermal-manifest/1"
 #: The factor that answers are grouped by when none is chosen.
 FRAMING = "framing"
-#: From near to far. A randomised questionnaire shows them in any order, so that first appearance says nothing.
+#: From near to far. A randomised questionnaire shows them in any order, so that first appearance
+#: says nothing.
 KNOWN_FRAMINGS = ("close-up", "head-shot", "half-length")
-#: Levels 1 to 5 of the self-rating, and answers -2 to 2, where the study names none (study.md, 'The questionnaire').
+#: Levels 1 to 5 of the self-rating, and answers -2 to 2, where the study names none (study.md, 'The
+#: questionnaire').
 FAMILIARITY = ("1, no familiarity", "2", "3", "4", "5, high familiarity")
 
 
 @dataclass(frozen=True)
 class Codebook:
-    """Order and labels of a study's framings and techniques; `order_rule` and `framing_rule` say where the orders come from.
+    """Order and labels of a study's framings and techniques; `order_rule` and `framing_rule` say
+    where the orders come from.
 
-    factor: the column of the table that answers are grouped by. Where it is not 'framing', `framings` are its levels; see `by`.
+    factor: the column of the table that answers are grouped by. Where it is not 'framing',
+    `framings` are its levels; see `by`.
     """
 
     framings: tuple[str, ...]
@@ -60,10 +65,16 @@ class Codebook:
         return f"{number} {self.level if number == 1 else self.levels}"
 
     def by(self, factor: str, levels: Iterable[str], rule: str) -> Codebook:
-        """The same study with the levels of another factor in the place of its framings: 'day', but '3 (familiarity)' for a number."""
+        """The same study with the levels of another factor in the place of its framings: 'day', but
+        '3 (familiarity)' for a number.
+        """
         levels, spoken = tuple(levels), factor.replace("_", " ")
         labels = {key: label for key, label in self.labels.items() if key[0] != "framing"}
-        labels |= {("framing", level): f"{level} ({spoken})" for level in levels if not any(map(str.isalpha, level))}
+        labels |= {
+            ("framing", level): f"{level} ({spoken})"
+            for level in levels
+            if not any(map(str.isalpha, level))
+        }
         return replace(self, framings=levels, framing_rule=rule, labels=labels, factor=factor)
 
     @property
@@ -78,12 +89,18 @@ class Codebook:
         return self.labels.get(("technique", technique), technique)
 
     def ordered(self, order: Iterable[str], needed: Iterable[str]) -> Codebook:
-        """The same codebook with the techniques in `order`, which must name each of `needed` once and nothing unknown."""
+        """The same codebook with the techniques in `order`, which must name each of `needed` once
+        and nothing unknown.
+        """
         order, needed = tuple(order), list(needed)
         twice = [name for name in dict.fromkeys(order) if order.count(name) > 1]
         missing = [name for name in needed if name not in order]
         unknown = [name for name in order if name not in self.techniques]
-        for fault, names in (("names twice", twice), ("lacks", missing), ("names the unknown", unknown)):
+        for fault, names in (
+            ("names twice", twice),
+            ("lacks", missing),
+            ("names the unknown", unknown),
+        ):
             if names:
                 raise InputError(
                     f"the order {','.join(order)!r} {fault} {', '.join(map(repr, names))}; "
@@ -93,7 +110,9 @@ class Codebook:
 
 
 def from_table(framings: Iterable[str], techniques: Iterable[str]) -> Codebook:
-    """The codebook of a table without a manifest; names come in order of first appearance and are their own labels."""
+    """The codebook of a table without a manifest; names come in order of first appearance and are
+    their own labels.
+    """
     seen = tuple(dict.fromkeys(framings))
     known = tuple(name for name in KNOWN_FRAMINGS if name in seen)
     rule = "from near to far, by their known names" if known else "first appearance in the table"
@@ -108,19 +127,26 @@ def from_table(framings: Iterable[str], techniques: Iterable[str]) -> Codebook:
 
 
 def is_manifest(path: Path) -> bool:
-    """Whether the file is a subdermal manifest of any version, whole or not; other tools write a `manifest.json` too."""
+    """Whether the file is a subdermal manifest of any version, whole or not; other tools write a
+    `manifest.json` too.
+    """
     return b'"subdermal-manifest/' in path.read_bytes()
 
 
 def read_manifest(path: str | Path) -> Codebook:
-    """The codebook of a study, from its `manifest.json` (or the folder that holds it). Images are not looked at."""
+    """The codebook of a study, from its `manifest.json` (or the folder that holds it).
+
+    Images are not looked at.
+    """
     path = Path(path)
     if path.is_dir():
         path = path / "manifest.json"
     try:
         manifest = json.loads(path.read_bytes())
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json"
+        ) from None
     except ValueError as error:
         raise InputError(f"{path}: not JSON: {' '.join(str(error).split())}") from None
     if not isinstance(manifest, dict) or manifest.get("format") != MANIFEST_FORMAT:
@@ -128,12 +154,16 @@ def read_manifest(path: str | Path) -> Codebook:
         raise InputError(f"{path}: format is {got!r}, expected {MANIFEST_FORMAT!r}")
     study = manifest.get("study")
     if not isinstance(study, dict):
-        raise InputError(f"{path}: study is {study!r:.60}, expected a table with framings and techniques")
+        raise InputError(
+            f"{path}: study is {study!r:.60}, expected a table with framings and techniques"
+        )
     framings, techniques = (_named(path, study, key) for key in ("framings", "techniques"))
     rating = study.get("familiarity")
     levels = rating.get("labels") if isinstance(rating, dict) else None
     if levels is not None and not (
-        isinstance(levels, list) and len(levels) == 5 and all(isinstance(text, str) for text in levels)
+        isinstance(levels, list)
+        and len(levels) == 5
+        and all(isinstance(text, str) for text in levels)
     ):
         raise InputError(f"{path}: study.familiarity.labels is {levels!r:.60}, expected five texts")
     return Codebook(
@@ -152,12 +182,16 @@ def _named(path: Path, study: dict, key: str) -> dict[str, str]:
     """Name -> label of study.framings or study.techniques, checked."""
     entries = study.get(key)
     if not isinstance(entries, list) or not entries:
-        raise InputError(f"{path}: study.{key} is {entries!r:.60}, expected a list of tables with a name")
+        raise InputError(
+            f"{path}: study.{key} is {entries!r:.60}, expected a list of tables with a name"
+        )
     labels: dict[str, str] = {}
     for place, entry in enumerate(entries):
         name = entry.get("name") if isinstance(entry, dict) else None
         if not isinstance(name, str) or not name or name in labels:
-            raise InputError(f"{path}: study.{key}[{place}].name is {name!r:.60}, expected a name of its own")
+            raise InputError(
+                f"{path}: study.{key}[{place}].name is {name!r:.60}, expected a name of its own"
+            )
         label = entry.get("label")
         labels[name] = label if isinstance(label, str) and label else name
     return labels

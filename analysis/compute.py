@@ -1,4 +1,6 @@
-"""Every statistic of a study in one call: tables with fixed columns, and notes that say what was refused and which variant was used.
+"""Every statistic of a study in one call: tables with fixed columns, and notes.
+
+The notes say what was refused and which variant was used.
 
     from analysis import read_responses
     from analysis.compute import everything
@@ -6,33 +8,45 @@
     results.tables["worths"]            # a DataFrame
     results.notes["worths"]             # what is not in it, and why
 
-Numbers that do not exist are empty (NaN), and a note names the reason. Intervals are at `Options.level`; unless a table says
-otherwise they come from a bootstrap over participants (`analysis.bootstrap`). Preferences run from -2 (strong for a) over 0 to
-2 (strong for b). The framing 'overall' holds all framings together, where there are several.
+Numbers that do not exist are empty (NaN), and a note names the reason. Intervals are at
+`Options.level`; unless a table says otherwise they come from a bootstrap over participants
+(`analysis.bootstrap`). Preferences run from -2 (strong for a) over 0 to 2 (strong for b). The
+framing 'overall' holds all framings together, where there are several.
 
-Answers that were read with another factor (`read_responses(..., factor="lighting")`) are grouped by it: every table keeps its columns,
-and `framing` holds the level. The table notes begins with what the levels hold, under the name 'all'.
+Answers that were read with another factor (`read_responses(..., factor="lighting")`) are grouped
+by it: every table keeps its columns, and `framing` holds the level. The table notes begins with
+what the levels hold, under the name 'all'.
 
-    tallies         framing,technique,score,low,high                                            points, see analysis.tallies
+    tallies         framing,technique,score,low,high
+                    points, see analysis.tallies
     pair_medians    framing,a,b,n,median_preference,low,high
-    ahp_intervals   framing,aggregation,method,technique,priority,low,high                      aggregation median|geometric_mean,
-                                                                                                method eigenvector|row_geometric_mean
+    ahp_intervals   framing,aggregation,method,technique,priority,low,high
+                    aggregation median|geometric_mean, method eigenvector|row_geometric_mean
     ahp_consistency framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,judgement,consistent
-                                                                                                a,b: the judgement to look at again,
-                                                                                                'consistent' what the others imply
-    worths          framing,model,technique,estimate,low,high                                   centred on 0 within a framing
-    worth_models    framing,model,parameter,estimate,low,high                                   ties, side effect, spread of people
-    pairs           framing,a,b,n,strong_a,slight_a,none,slight_b,strong_b,wilcoxon_p,sign_p,holm_p,tost_p,wilcoxon_method,
-                    mean_preference,low,high,equivalence_low,equivalence_high,tost_holm_p,equivalent,
-                    rank_biserial,dz,jod,jod_low,jod_high,jod_equivalent                        jod: worth of b less worth of a
-    trend           statistic,value,low,high,p                                                  preference against distance
+                    a,b: the judgement to look at again, 'consistent' what the others imply
+    worths          framing,model,technique,estimate,low,high
+                    centred on 0 within a framing
+    worth_models    framing,model,parameter,estimate,low,high
+                    ties, side effect, spread of people
+    pairs           framing,a,b,n,strong_a,slight_a,none,slight_b,strong_b,wilcoxon_p,sign_p,holm_p,
+                    tost_p,wilcoxon_method,mean_preference,low,high,equivalence_low,
+                    equivalence_high,tost_holm_p,equivalent,rank_biserial,dz,jod,jod_low,jod_high,
+                    jod_equivalent
+                    jod: worth of b less worth of a
+    trend           statistic,value,low,high,p
+                    preference against distance
     agreement       framing,statistic,value,low,high,p
-    participants    participant,familiarity,answers,left,none,right,side_p,same_answer_share,median_rt_ms,circular_triads,
-                    zeta,repeats,repeat_share,agreement_with_others,excluded                    excluded: the rule that fires, or ''
-    sensitivity     framing,conclusion,a,b,everyone,without_excluded,changed                    with and without the excluded
-    familiarity_interaction framing,technique,n,slope,low,high,spearman,p,holm_p,detectable     detectable: the correlation found
-                                                                                                with a power of 0.8
-    notes           table,note                                                                  what was refused, and why
+    participants    participant,familiarity,answers,left,none,right,side_p,same_answer_share,
+                    median_rt_ms,circular_triads,zeta,repeats,repeat_share,agreement_with_others,
+                    excluded
+                    excluded: the rule that fires, or ''
+    sensitivity     framing,conclusion,a,b,everyone,without_excluded,changed
+                    with and without the excluded
+    familiarity_interaction
+                    framing,technique,n,slope,low,high,spearman,p,holm_p,detectable
+                    detectable: the correlation found with a power of 0.8
+    notes           table,note
+                    what was refused, and why
 """
 
 from __future__ import annotations
@@ -42,14 +56,16 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from . import agreement, ahp, bootstrap, inference, worth
-from .options import Options
-from .responses import Responses
+from analysis import agreement, ahp, bootstrap, inference, worth
+from analysis.options import Options
+from analysis.responses import Responses
 
 
 @dataclass(frozen=True)
 class Results:
-    """tables: name -> DataFrame; notes: name -> lines; options: what was chosen; see the module for the columns."""
+    """tables: name -> DataFrame; notes: name -> lines; options: what was chosen;
+    see the module for the columns.
+    """
 
     tables: Mapping[str, pd.DataFrame]
     notes: Mapping[str, tuple[str, ...]]
@@ -57,7 +73,10 @@ class Results:
 
 
 def everything(responses: Responses, options: Options | None = None) -> Results:
-    """All tables of this module's docstring. Deterministic: the same answers and options give the same bytes."""
+    """All tables of this module's docstring.
+
+    Deterministic: the same answers and options give the same bytes.
+    """
     options = options or Options()
     tables = {
         "tallies": bootstrap.score_intervals(responses, options),
@@ -74,5 +93,9 @@ def everything(responses: Responses, options: Options | None = None) -> Results:
         "familiarity_interaction": inference.familiarity_interaction(responses, options),
     }
     notes = {name: table.attrs.get("notes", ()) for name, table in tables.items()}
-    lines = [("all", line) for line in responses.grouping] + [(name, line) for name, said in notes.items() for line in said]
-    return Results(tables | {"notes": pd.DataFrame(lines, columns=["table", "note"])}, notes, options)
+    lines = [("all", line) for line in responses.grouping] + [
+        (name, line) for name, said in notes.items() for line in said
+    ]
+    return Results(
+        tables | {"notes": pd.DataFrame(lines, columns=["table", "note"])}, notes, options
+    )

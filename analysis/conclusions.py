@@ -1,8 +1,9 @@
-"""In plain words, from the numbers: what can be concluded, what cannot. Every sentence holds a number of the tables, or none.
+"""In plain words, from the numbers: what can be concluded, what cannot. Every sentence holds a
+number of the tables, or none.
 
-A difference is concluded where Holm's p of the declared test is at most 1 - level; that two techniques are as good as each other only
-where the interval and, after Holm's correction, both one-sided tests put them within the declared margin. Everything else is undecided,
-and said to be.
+A difference is concluded where Holm's p of the declared test is at most 1 - level; that two
+techniques are as good as each other only where the interval and, after Holm's correction, both
+one-sided tests put them within the declared margin. Everything else is undecided, and said to be.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from .codebook import Codebook
-from .options import OVERALL, Options
-from .shown import alpha_of, number, probability
-from .worth_figures import framing_label, verdict
+from analysis.codebook import Codebook
+from analysis.options import OVERALL, Options
+from analysis.shown import alpha_of, number, probability
+from analysis.worth_figures import framing_label, verdict
 
 SPOKEN = {
     "bradley_terry": "Bradley and Terry's model",
@@ -53,7 +54,8 @@ def conclude(
         _about_pairs(found, framing_label(codebook, framing), rows, codebook, options, alpha, who)
     if not (options.margin or options.margin_jod):
         found.cannot.append(
-            "No margin of equivalence was declared before the data, so that no two techniques can be called as good as each other; "
+            "No margin of equivalence was declared before the data, so that no two "
+            "techniques can be called as good as each other; "
             "that a test finds no difference does not make them equal."
         )
     _about_trend(found, tables["trend"], codebook, alpha)
@@ -64,14 +66,21 @@ def conclude(
     found.cannot.append(
         "Nothing here says how people judge, since a program answered."
         if simulated
-        else "These answers speak for people like those asked, on displays like theirs, and for these images of this head; "
+        else "These answers speak for people like those asked, on displays like theirs, and "
+        "for these images of this head; "
         "for other ones they are a guess."
     )
     return found
 
 
 def _about_pairs(
-    found: Conclusions, where: str, rows: pd.DataFrame, codebook: Codebook, options: Options, alpha: float, who: str
+    found: Conclusions,
+    where: str,
+    rows: pd.DataFrame,
+    codebook: Codebook,
+    options: Options,
+    alpha: float,
+    who: str,
 ) -> None:
     by = {key: [] for key in ("different", "equivalent", "both", "undecided")}
     for row in rows.itertuples():
@@ -84,22 +93,37 @@ def _about_pairs(
             winner, loser = (row.a, row.b) if row.mean_preference < 0 else (row.b, row.a)
             over.setdefault(winner, []).append(loser)
         order = sorted(over, key=lambda name: (-len(over[name]), codebook.techniques.index(name)))
-        words = "; ".join(f"{codebook.label(name)} over {listed([codebook.label(one) for one in over[name]])}" for name in order)
+        words = "; ".join(
+            f"{codebook.label(name)} over {listed([codebook.label(one) for one in over[name]])}"
+            for name in order
+        )
         largest = probability(max(row.holm_p for row in differing))
         most = largest if largest.startswith("<") else f"at most {largest}"
         found.can.append(
-            f"{where}: {who} preferred {words} ({_test(options)}, p {most} after Holm's correction; "
+            f"{where}: {who} preferred {words} ({_test(options)}, p {most} after Holm's "
+            "correction; "
             f"{len(differing)} of {len(rows)} pairs)."
         )
     for row in by["equivalent"] + by["both"]:
         a, b = codebook.label(row.a), codebook.label(row.b)
         if options.margin:
-            words = f"{where}: {a} and {b} are as good as each other within the declared margin of {options.margin:g} points"
+            words = (
+                f"{where}: {a} and {b} are as good as each other within the declared "
+                f"margin of {options.margin:g} points"
+            )
             words += f": the mean preference for {b} is {number(row.mean_preference, sign=True)}"
-            words += f", interval {number(row.equivalence_low, sign=True)} to {number(row.equivalence_high, sign=True)}"
-            words += f" (two one-sided tests, p {_equals(row.tost_holm_p)} after Holm's correction)."
+            words += (
+                f", interval {number(row.equivalence_low, sign=True)} to "
+                f"{number(row.equivalence_high, sign=True)}"
+            )
+            words += (
+                f" (two one-sided tests, p {_equals(row.tost_holm_p)} after Holm's correction)."
+            )
         else:
-            words = f"{where}: {a} and {b} are as good as each other within the declared margin of {options.margin_jod:g} JOD"
+            words = (
+                f"{where}: {a} and {b} are as good as each other within the declared "
+                f"margin of {options.margin_jod:g} JOD"
+            )
             words += f": {b} is {number(row.jod, sign=True)} JOD above {a}."
         if row in by["both"]:
             words += " The difference is real, and small."
@@ -107,9 +131,12 @@ def _about_pairs(
     for row in by["undecided"] + by["different"]:
         if row.equivalent == 1:
             found.cannot.append(
-                f"{where}: {codebook.label(row.a)} and {codebook.label(row.b)} come within the margin of {options.margin:g} points when "
-                f"taken alone (two one-sided tests, p {_equals(row.tost_p)}), which holds only if this pair was singled out before the "
-                f"data; after Holm's correction over all pairs it does not (p {_equals(row.tost_holm_p)})."
+                f"{where}: {codebook.label(row.a)} and {codebook.label(row.b)} come within "
+                f"the margin of {options.margin:g} points when "
+                f"taken alone (two one-sided tests, p {_equals(row.tost_p)}), which holds "
+                "only if this pair was singled out before the "
+                "data; after Holm's correction over all pairs it does not (p "
+                f"{_equals(row.tost_holm_p)})."
             )
     untested = [row for row in rows.itertuples() if not np.isfinite(row.holm_p)]
     if untested:
@@ -121,10 +148,13 @@ def _about_pairs(
         if not options.margin and not options.margin_jod:
             tail = "no difference is shown, which does not make them equal"
         if len(undecided) == len(rows) > 1:
-            found.cannot.append(f"{where}: all {len(rows)} pairs are undecided: {tail} for any of them.")
+            found.cannot.append(
+                f"{where}: all {len(rows)} pairs are undecided: {tail} for any of them."
+            )
         else:
             found.cannot.append(
-                f"{where}: {len(undecided)} of {count(len(rows), 'pair')} {'is' if len(undecided) == 1 else 'are'} undecided: {tail} for "
+                f"{where}: {len(undecided)} of {count(len(rows), 'pair')} "
+                f"{'is' if len(undecided) == 1 else 'are'} undecided: {tail} for "
                 f"{_pairs(undecided, codebook)}."
             )
 
@@ -134,40 +164,80 @@ def _about_trend(found: Conclusions, trend: pd.DataFrame, codebook: Codebook, al
     if slope.empty or not np.isfinite(slope.value.iloc[0]):
         return
     row = slope.iloc[0]
-    path = "from near to far" if codebook.near_to_far else "from framing to framing in the study's order"
-    words = f"the points that an answer gives change by {number(row.value, 3, sign=True)} a framing {path}"
+    path = (
+        "from near to far"
+        if codebook.near_to_far
+        else "from framing to framing in the study's order"
+    )
+    words = (
+        f"the points that an answer gives change by {number(row.value, 3, sign=True)} a "
+        f"framing {path}"
+    )
     if np.isfinite(row.low):
         words += f" (interval {number(row.low, 3, sign=True)} to {number(row.high, 3, sign=True)}"
         words += f", p {_equals(row.p)})" if np.isfinite(row.p) else ")"
     if np.isfinite(row.p) and row.p <= alpha:
-        found.can.append(f"Preferences get {'weaker' if row.value < 0 else 'stronger'} along the framings: {words}.")
+        found.can.append(
+            f"Preferences get {'weaker' if row.value < 0 else 'stronger'} along the framings: "
+            f"{words}."
+        )
     else:
         found.cannot.append(f"Whether preferences weaken or grow along the framings: {words}.")
 
 
-def _about_agreement(found: Conclusions, agreement: pd.DataFrame, codebook: Codebook, alpha: float, who: str) -> None:
+def _about_agreement(
+    found: Conclusions, agreement: pd.DataFrame, codebook: Codebook, alpha: float, who: str
+) -> None:
     rows = agreement[agreement.framing != OVERALL].set_index(["framing", "statistic"])
     agree: dict[bool, list[str]] = {True: [], False: []}
     for framing in dict.fromkeys(agreement.framing[agreement.framing != OVERALL]):
-        values = [rows.loc[(framing, name)] for name in ("kendall_u", "kendall_u_conditional") if (framing, name) in rows.index]
+        values = [
+            rows.loc[(framing, name)]
+            for name in ("kendall_u", "kendall_u_conditional")
+            if (framing, name) in rows.index
+        ]
         tested = [one for one in values if np.isfinite(one.value) and np.isfinite(one.p)]
         if tested:
-            words = f"{number(tested[0].value)} at {framing_label(codebook, framing)} (p {_equals(tested[0].p)})"
+            words = (
+                f"{number(tested[0].value)} at {framing_label(codebook, framing)} (p "
+                f"{_equals(tested[0].p)})"
+            )
             agree[bool(tested[0].p <= alpha)].append(words)
     if agree[True]:
         found.can.append(
-            f"{who} agree with each other more than chance would: Kendall's u is {listed(agree[True])}; 1 would be full agreement."
+            f"{who} agree with each other more than chance would: Kendall's u is "
+            f"{listed(agree[True])}; 1 would be full agreement."
         )
     if agree[False]:
-        found.cannot.append(f"Whether {who.lower()} agree with each other more than chance would: Kendall's u is {listed(agree[False])}.")
+        found.cannot.append(
+            f"Whether {who.lower()} agree with each other more than chance would: Kendall's u "
+            f"is {listed(agree[False])}."
+        )
     side = rows[rows.index.get_level_values("statistic") == "left_share"] if len(rows) else rows
-    leaning = [(framing, one) for (framing, _), one in side.iterrows() if np.isfinite(one.p) and one.p <= alpha]
+    leaning = [
+        (framing, one)
+        for (framing, _), one in side.iterrows()
+        if np.isfinite(one.p) and one.p <= alpha
+    ]
     if leaning:
-        words = listed([f"{100 * one.value:.0f} % at {framing_label(codebook, framing)} (p {_equals(one.p)})" for framing, one in leaning])
-        found.can.append(f"{who} lean to one side: of their preferences, the left image got {words}; sides were shuffled against that.")
+        words = listed(
+            [
+                (
+                    f"{100 * one.value:.0f} % at {framing_label(codebook, framing)} (p "
+                    f"{_equals(one.p)})"
+                )
+                for framing, one in leaning
+            ]
+        )
+        found.can.append(
+            f"{who} lean to one side: of their preferences, the left image got {words}; sides "
+            "were shuffled against that."
+        )
 
 
-def _about_familiarity(found: Conclusions, table: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
+def _about_familiarity(
+    found: Conclusions, table: pd.DataFrame, codebook: Codebook, alpha: float
+) -> None:
     tested = table[table.holm_p.notna()]
     if tested.empty:
         return
@@ -185,22 +255,34 @@ def _about_familiarity(found: Conclusions, table: pd.DataFrame, codebook: Codebo
     least = tested.detectable.min()
     words = "Whether familiarity with computer graphics changes preference: no change is shown"
     if np.isfinite(least):
-        words += f", and with so many people only a correlation of {number(least)} or more would be found four times in five"
+        words += (
+            f", and with so many people only a correlation of {number(least)} or more "
+            "would be found four times in five"
+        )
     found.cannot.append(words + ".")
 
 
-def _about_exclusions(found: Conclusions, participants: pd.DataFrame, sensitivity: pd.DataFrame, people: int) -> None:
+def _about_exclusions(
+    found: Conclusions, participants: pd.DataFrame, sensitivity: pd.DataFrame, people: int
+) -> None:
     out = int(participants.excluded.fillna("").astype(str).ne("").sum())
     if not out:
-        found.can.append(f"The rules of exclusion fire for none of {count(people, 'participant')}: no conclusion hangs on them.")
+        found.can.append(
+            f"The rules of exclusion fire for none of {count(people, 'participant')}: no "
+            "conclusion hangs on them."
+        )
         return
     if out == people or sensitivity.empty:
         found.cannot.append(
-            f"The rules exclude {out} of {count(people, 'participant')}: those who are left are too few to compute the conclusions again."
+            f"The rules exclude {out} of {count(people, 'participant')}: those who are left "
+            "are too few to compute the conclusions again."
         )
         return
     changed = int(sensitivity.changed.fillna(False).astype(bool).sum())
-    words = f"Without the {count(out, 'participant')} whom the rules exclude, {changed} of {count(len(sensitivity), 'conclusion')}"
+    words = (
+        f"Without the {count(out, 'participant')} whom the rules exclude, {changed} of "
+        f"{count(len(sensitivity), 'conclusion')}"
+    )
     if changed:
         found.cannot.append(f"{words} would change; see the table of those.")
     else:
@@ -222,7 +304,9 @@ def _pairs(rows: list, codebook: Codebook) -> str:
 
 
 def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) -> None:
-    """Fits that do not exist, from the notes 'FRAMING, MODEL: no finite worths: REASON', models of one reason together."""
+    """Fits that do not exist, from the notes 'FRAMING, MODEL: no finite worths: REASON', models of
+    one reason together.
+    """
     models: dict[tuple[str, str], list[str]] = {}
     for line in notes:
         head, mark, reason = line.partition(": no finite worths: ")
@@ -230,10 +314,16 @@ def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) 
         if mark:
             models.setdefault((framing, reason.rstrip(".")), []).append(SPOKEN.get(model, model))
     labels = {name: codebook.label(name) for name in codebook.techniques}
-    words = re.compile("|".join(rf"(?<!\w){re.escape(name)}(?!\w)" for name in sorted(labels, key=len, reverse=True)))
+    words = re.compile(
+        "|".join(
+            rf"(?<!\w){re.escape(name)}(?!\w)" for name in sorted(labels, key=len, reverse=True)
+        )
+    )
     for (framing, reason), names in models.items():
         spoken = words.sub(lambda found: labels[found[0]], reason)
-        found.cannot.append(f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: {spoken}.")
+        found.cannot.append(
+            f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: {spoken}."
+        )
 
 
 def listed(names: list[str]) -> str:

@@ -1,8 +1,11 @@
-"""What a study declared of its analysis before anybody was asked: `study.analysis` of its manifest, as `Options`.
+"""What a study declared of its analysis before anybody was asked: `study.analysis` of its manifest,
+as `Options`.
 
-    "analysis": {"margin": 0.25, "margin_jod": 0.5, "test": "wilcoxon", "exclusions": {"median_rt_ms": 500, "zeta": false}}
+    "analysis": {"margin": 0.25, "margin_jod": 0.5, "test": "wilcoxon", "exclusions":
+    {"median_rt_ms": 500, "zeta": false}}
 
-Keys are the fields of `options.Options` and `options.Exclusions`; what is not declared has their defaults; a rule that is false is off.
+Keys are the fields of `options.Options` and `options.Exclusions`; what is not declared has their
+defaults; a rule that is false is off.
 """
 
 from __future__ import annotations
@@ -12,21 +15,25 @@ from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 
-from .errors import InputError
-from .options import Exclusions, Options
+from analysis.errors import InputError
+from analysis.options import Exclusions, Options
 
 #: Where margins and rules come from, when no study file declares any.
 UNDECLARED = "no margin or rule was declared in a study file: the defaults of subdermal"
 
 
 def read_declared(path: str | Path) -> dict:
-    """`study.analysis` of a manifest.json (or of the folder that holds it); empty where it declares nothing."""
+    """`study.analysis` of a manifest.json (or of the folder that holds it); empty where it declares
+    nothing.
+    """
     path = Path(path)
     path = path / "manifest.json" if path.is_dir() else path
     try:
         declared = json.loads(path.read_bytes())["study"].get("analysis", {})
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json"
+        ) from None
     except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError(f"{path}: has no study, expected a study's manifest.json") from None
     if not isinstance(declared, dict):
@@ -34,18 +41,33 @@ def read_declared(path: str | Path) -> dict:
     return declared
 
 
-def options(declared: Mapping[str, object], source: str = "study.analysis", **given: object) -> Options:
+def options(
+    declared: Mapping[str, object], source: str = "study.analysis", **given: object
+) -> Options:
     """Options from what a study declared, with what is `given` (None: not given) in its place."""
     values = {**declared, **{name: value for name, value in given.items() if value is not None}}
     rules = values.pop("exclusions", {})
     if not isinstance(rules, Mapping):
         raise InputError(f"{source}.exclusions is {rules!r:.60}, expected a table")
-    for name, table, known in ((source, values, Options), (f"{source}.exclusions", rules, Exclusions)):
+    for name, table, known in (
+        (source, values, Options),
+        (f"{source}.exclusions", rules, Exclusions),
+    ):
         names = [field.name for field in fields(known) if field.name != "exclusions"]
         unknown = [key for key in table if key not in names]
         if unknown:
-            raise InputError(f"{name} names the unknown {', '.join(map(str, unknown))}; expected some of {', '.join(names)}")
-    for key, value in [*rules.items(), *((key, value) for key, value in values.items() if key in ("margin", "margin_jod", "level"))]:
+            raise InputError(
+                f"{name} names the unknown {', '.join(map(str, unknown))}; expected some of "
+                f"{', '.join(names)}"
+            )
+    for key, value in [
+        *rules.items(),
+        *(
+            (key, value)
+            for key, value in values.items()
+            if key in ("margin", "margin_jod", "level")
+        ),
+    ]:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number and not (value is False and key in rules):
             raise InputError(f"{source}: {key} is {value!r:.60}, expected a number")

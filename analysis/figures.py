@@ -1,7 +1,7 @@
 """The thesis's figures 5.3 to 5.9, for any response table, at the widths of a journal's columns.
 
-Okabe-Ito palette (safe for colour-blind readers), outlined fonts in SVG and embedded ones in PDF, the same bytes on every run.
-Every figure of simulated answers carries a mark that says so.
+Okabe-Ito palette (safe for colour-blind readers), outlined fonts in SVG and embedded ones in PDF,
+the same bytes on every run. Every figure of simulated answers carries a mark that says so.
 """
 
 from __future__ import annotations
@@ -23,20 +23,22 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from . import tallies
-from .ahp import Priorities
-from .codebook import FRAMING, Codebook
-from .responses import Responses
+from analysis import tallies
+from analysis.ahp import Priorities
+from analysis.codebook import FRAMING, Codebook
+from analysis.responses import Responses
 
 SIMULATED = "SIMULATED ANSWERS"
 #: M. Okabe and K. Ito, "Color Universal Design", 2002.
 BLUE, SKY, ORANGE, VERMILLION, GREEN = "#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73"
 GREY, INK = "#C8C8C8", "#222222"
-#: One colour for each of the five answers, from strong for the first to strong for the second, and for the text on it.
+#: One colour for each of the five answers, from strong for the first to strong for the second, and
+#: for the text on it.
 ANSWERS = (BLUE, SKY, GREY, ORANGE, VERMILLION)
 ON_ANSWERS = ("white", INK, INK, INK, "white")
 
-#: One and two columns of a journal page: ACM's two-column format; the text of its one-column journals is between the two.
+#: One and two columns of a journal page: ACM's two-column format; the text of its one-column
+#: journals is between the two.
 SINGLE_MM, DOUBLE_MM = 84.7, 177.8
 WIDTH_IN, NARROW_IN = DOUBLE_MM / 25.4, SINGLE_MM / 25.4
 BANNER_IN = 0.26
@@ -68,7 +70,9 @@ RC = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as bytes; `name` is its file name without suffix, `alt` what it shows, for those who cannot see it."""
+    """A figure as bytes; `name` is its file name without suffix, `alt` what it shows, for those who
+    cannot see it.
+    """
 
     name: str
     title: str
@@ -81,13 +85,23 @@ class Picture:
     @property
     def files(self) -> dict[str, bytes]:
         """The picture in every form: path inside the output folder -> content."""
-        return {f"figures/{self.name}.{kind}": getattr(self, kind) for kind in ("pdf", "png", "svg")}
+        return {
+            f"figures/{self.name}.{kind}": getattr(self, kind) for kind in ("pdf", "png", "svg")
+        }
 
 
 def _picture(
-    name: str, title: str, caption: str, alt: str, draw: Callable[..., Figure], *args: object, simulated: bool = False
+    name: str,
+    title: str,
+    caption: str,
+    alt: str,
+    draw: Callable[..., Figure],
+    *args: object,
+    simulated: bool = False,
 ) -> Picture:
-    """Draw with our style and save; nothing global changes. Letters that the font lacks are said in the caption."""
+    """Draw with our style and save; nothing global changes. Letters that the font lacks are said in
+    the caption.
+    """
     with (
         matplotlib.rc_context({**matplotlib.rcParamsDefault, "backend": "agg", **RC}),
         warnings.catch_warnings(record=True) as warned,
@@ -97,7 +111,8 @@ def _picture(
         if simulated:
             _mark(figure)
         about = f"{SIMULATED}. {title}" if simulated else title
-        # laid out once, at the resolution of the PNG, and then drawn once for each form: savefig would do both three times
+        # laid out once, at the resolution of the PNG, and then drawn once for each form: savefig
+        # would do both three times
         figure.dpi = matplotlib.rcParams["savefig.dpi"]
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
@@ -107,7 +122,10 @@ def _picture(
         FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None, "Title": about})
     lacking = [one for one in warned if "missing from" in str(one.message)]
     if lacking:
-        caption += " Some letters of its names are not in the figure's font and show as boxes; the tables have them."
+        caption += (
+            " Some letters of its names are not in the figure's font and show as "
+            "boxes; the tables have them."
+        )
     for one in warned:
         if one not in lacking:
             warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
@@ -121,14 +139,28 @@ def _mark(figure: Figure) -> None:
     figure.set_size_inches(width, height + BANNER_IN)
     strip = BANNER_IN / (height + BANNER_IN)
     figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 1.2 * strip))
-    figure.add_artist(Rectangle((0, 1 - strip), 1, strip, facecolor=VERMILLION, transform=figure.transFigure))
+    figure.add_artist(
+        Rectangle((0, 1 - strip), 1, strip, facecolor=VERMILLION, transform=figure.transFigure)
+    )
     figure.text(
-        0.5, 1 - strip / 2, SIMULATED, color="white", weight="bold", size=11, ha="center", va="center_baseline"
+        0.5,
+        1 - strip / 2,
+        SIMULATED,
+        color="white",
+        weight="bold",
+        size=11,
+        ha="center",
+        va="center_baseline",
     )
 
 
 def _panels(
-    count: int, columns: int, height_in: float, width_in: float = WIDTH_IN, below_in: float = 0, **share: object
+    count: int,
+    columns: int,
+    height_in: float,
+    width_in: float = WIDTH_IN,
+    below_in: float = 0,
+    **share: object,
 ) -> tuple[Figure, list[Axes]]:
     """A figure with so many panels of that height, and room below them for a key."""
     columns = min(columns, count)
@@ -163,9 +195,13 @@ def _bars(
     axis: str,
     digits: int,
 ) -> Figure:
-    """One panel a framing, one bar a technique; a technique without a value there gets no bar and says so."""
+    """One panel a framing, one bar a technique; a technique without a value there gets no bar and
+    says so.
+    """
     rows = [_wrapped(label) for label in labels.values()]
-    figure, panels = _panels(len(values), 3, 0.5 + _row_in(rows) * len(rows), below_in=0.3, sharex=True, sharey=True)
+    figure, panels = _panels(
+        len(values), 3, 0.5 + _row_in(rows) * len(rows), below_in=0.3, sharex=True, sharey=True
+    )
     top = max((value for one in values.values() for value in one.values()), default=0) or 1
     for ax, (framing, one) in zip(panels, values.items(), strict=True):
         for place, technique in enumerate(labels):
@@ -190,7 +226,15 @@ def _bars(
 def _value(ax: Axes, x: float, y: float, text: str) -> None:
     """The number at the end of a bar, clear of grid lines."""
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
-    ax.annotate(text, (x, y), xytext=(3, 0), textcoords="offset points", size=7.5, va="center_baseline", bbox=box)
+    ax.annotate(
+        text,
+        (x, y),
+        xytext=(3, 0),
+        textcoords="offset points",
+        size=7.5,
+        va="center_baseline",
+        bbox=box,
+    )
 
 
 def _familiarity(table: pd.DataFrame) -> Figure:
@@ -207,20 +251,35 @@ def _familiarity(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], axis: str, line: tallies.Trend | None) -> Figure:
+def _total_by_distance(
+    table: pd.DataFrame, labels: Sequence[str], axis: str, line: tallies.Trend | None
+) -> Figure:
     figure, (ax,) = _panels(1, 1, 2.7, NARROW_IN)
     distance = np.arange(1, len(table) + 1)
     if line is not None:
         ends = np.array([0.75, len(table) + 0.25])
         fit = f"line: {line.slope:+.1f} points a framing".replace("-", "\N{MINUS SIGN}")
         fit += f", R² = {line.r2:.2f}" if np.isfinite(line.r2) else ""
-        ax.plot(ends, line.intercept + line.slope * ends, "--", color=VERMILLION, linewidth=1.2, label=fit)
+        ax.plot(
+            ends,
+            line.intercept + line.slope * ends,
+            "--",
+            color=VERMILLION,
+            linewidth=1.2,
+            label=fit,
+        )
     ax.plot(distance, table.total, "o", markersize=6, color=BLUE, label="total of all techniques")
     for x, total in zip(distance, table.total, strict=True):
         below = line is not None and total < line.intercept + line.slope * x
-        place = {"xytext": (0, -8 if below else 7), "textcoords": "offset points", "va": "top" if below else "bottom"}
+        place = {
+            "xytext": (0, -8 if below else 7),
+            "textcoords": "offset points",
+            "va": "top" if below else "bottom",
+        }
         ax.annotate(f"{total}", (x, total), ha="center", size=7.5, **place)
-    ax.set_xticks(distance, [_wrapped(label, max(6, min(14, 40 // len(labels)))) for label in labels])
+    ax.set_xticks(
+        distance, [_wrapped(label, max(6, min(14, 40 // len(labels)))) for label in labels]
+    )
     ax.set_xlim(0.6, len(table) + 0.4)
     ax.set_ylim(0, max(table.total.max(), 1) * 1.18)
     ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
@@ -232,26 +291,45 @@ def _total_by_distance(table: pd.DataFrame, labels: Sequence[str], axis: str, li
 
 
 def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
-    """One panel a technique, one bar an opponent; the answers 'no difference' straddle the middle."""
+    """One panel a technique, one bar an opponent;
+    the answers 'no difference' straddle the middle.
+    """
     techniques = list(dict.fromkeys(table.technique))
     shares = 100 * table[list(tallies.DISTRIBUTION)].to_numpy() / table.n.to_numpy()[:, None]
     starts = -(shares[:, 0] + shares[:, 1] + shares[:, 2] / 2)
     opponents = {name: _wrapped(codebook.label(name)) for name in techniques}
     most = table.groupby("technique").size().max()
-    figure, panels = _panels(len(techniques), 2, 0.5 + _row_in(list(opponents.values())) * most, below_in=0.5, sharex=True)
+    figure, panels = _panels(
+        len(techniques),
+        2,
+        0.5 + _row_in(list(opponents.values())) * most,
+        below_in=0.5,
+        sharex=True,
+    )
     for ax, technique in zip(panels, techniques, strict=True):
         rows = table.technique == technique
         about, share = table[rows], shares[rows]
         left = starts[rows]
         for answer, column in enumerate(tallies.DISTRIBUTION):
-            style = {"height": 0.74, "color": ANSWERS[answer], "edgecolor": "white", "linewidth": 0.4}
+            style = {
+                "height": 0.74,
+                "color": ANSWERS[answer],
+                "edgecolor": "white",
+                "linewidth": 0.4,
+            }
             ax.barh(range(len(about)), share[:, answer], left=left, **style)
             for place, count in enumerate(about[column]):
                 # a digit of 6.5 points needs about 4 % of a panel's width
                 if share[place, answer] >= 4 * len(str(count)):
                     middle = left[place] + share[place, answer] / 2
                     ax.text(
-                        middle, place, f"{count}", size=6.5, color=ON_ANSWERS[answer], ha="center", va="center_baseline"
+                        middle,
+                        place,
+                        f"{count}",
+                        size=6.5,
+                        color=ON_ANSWERS[answer],
+                        ha="center",
+                        va="center_baseline",
                     )
             left = left + share[:, answer]
         ax.axvline(0, color=INK, linewidth=0.7, zorder=0)
@@ -266,7 +344,10 @@ def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
     figure.legend(
         keys,
         ("strong", "slight", "no difference", "slight", "strong"),
-        title="←  the panel's technique is preferred      share of answers      the row's technique is preferred  →",
+        title=(
+            "←  the panel's technique is preferred      share of answers      the row's "
+            "technique is preferred  →"
+        ),
         title_fontsize=8,
         loc="outside lower center",
         ncols=5,
@@ -296,16 +377,34 @@ def _pair(values: Mapping[str, np.ndarray], pair: tuple[str, str], codebook: Cod
     for place, answers in zip(places, values.values(), strict=True):
         for value, count in zip(*np.unique(answers, return_counts=True), strict=True):
             x, y, gap = _lattice(int(count))
-            ax.plot(value + x, place + 2 * y, "o", color=INK, markersize=min(3.2, 36 * gap), markeredgewidth=0, zorder=5)
+            ax.plot(
+                value + x,
+                place + 2 * y,
+                "o",
+                color=INK,
+                markersize=min(3.2, 36 * gap),
+                markeredgewidth=0,
+                zorder=5,
+            )
     a, b = (codebook.label(name) for name in pair)
     ax.set_yticks(
-        places, [f"{_wrapped(codebook.framing_label(name), 12)}\n(n = {len(values[name])})" for name in values]
+        places,
+        [
+            f"{_wrapped(codebook.framing_label(name), 12)}\n(n = {len(values[name])})"
+            for name in values
+        ],
     )
     ax.set_ylim(len(values) - 0.5, -0.5)
     ax.set_xlim(-2.45, 2.45)
     ax.set_xticks(
         range(-2, 3),
-        [f"strong for\n{_wrapped(a, 11)}", "slight", "none", "slight", f"strong for\n{_wrapped(b, 11)}"],
+        [
+            f"strong for\n{_wrapped(a, 11)}",
+            "slight",
+            "none",
+            "slight",
+            f"strong for\n{_wrapped(b, 11)}",
+        ],
         size=7,
     )
     ax.grid(axis="x")
@@ -318,30 +417,47 @@ def _lattice(count: int) -> tuple[np.ndarray, np.ndarray, float]:
     gap = min(0.085, 0.34 / columns)
     place = np.arange(count)
     rows = -(-count // columns)
-    return ((place % columns) - (columns - 1) / 2) * gap, ((place // columns) - (rows - 1) / 2) * gap, gap
+    return (
+        ((place % columns) - (columns - 1) / 2) * gap,
+        ((place // columns) - (rows - 1) / 2) * gap,
+        gap,
+    )
 
 
 def draw_responses(
-    responses: Responses, found: Mapping[str, Priorities], pair: tuple[str, str], slugs: Mapping[str, str]
+    responses: Responses,
+    found: Mapping[str, Priorities],
+    pair: tuple[str, str],
+    slugs: Mapping[str, str],
 ) -> list[Picture]:
-    """All figures of a response table. found: priorities of the framings that have them; slugs: file names of the framings."""
+    """All figures of a response table.
+
+    found: priorities of the framings that have them; slugs: file names of the framings.
+    """
     codebook, simulated = responses.codebook, responses.simulated
-    used = [name for name in codebook.techniques if any(name in items for items in responses.items.values())]
+    used = [
+        name
+        for name in codebook.techniques
+        if any(name in items for items in responses.items.values())
+    ]
     labels = {name: codebook.label(name) for name in used}
     scores, totals = tallies.scores(responses), tallies.totals(responses)
     total = dict(zip(totals.framing, totals.total, strict=True))
     points = {
-        framing: dict(zip(rows.technique, rows.score, strict=True)) for framing, rows in scores.groupby("framing", sort=False)
+        framing: dict(zip(rows.technique, rows.score, strict=True))
+        for framing, rows in scores.groupby("framing", sort=False)
     }
     framings = [codebook.framing_label(name) for name in totals.framing]
     pictures = [
         _picture(
             "scores",
             f"Scores per {codebook.level}",
-            "Points of each technique (thesis, figure 5.3): a strong preference gives two, a slight one gives one, "
+            "Points of each technique (thesis, figure 5.3): a strong preference gives two, a "
+            "slight one gives one, "
             "no difference gives none.",
             "; ".join(
-                f"{codebook.framing_label(framing)}: " + ", ".join(f"{labels[name]} {score}" for name, score in one.items())
+                f"{codebook.framing_label(framing)}: "
+                + ", ".join(f"{labels[name]} {score}" for name, score in one.items())
                 for framing, one in points.items()
             ),
             _bars,
@@ -372,13 +488,21 @@ def draw_responses(
     if line:
         fitted = ", with the least-squares line; the framings are taken as equally far apart."
     else:
-        fitted = ". Fewer than three framings: no line is fitted." if by_framing else "; its levels are no distances, and no line is fitted."
+        fitted = (
+            ". Fewer than three framings: no line is fitted."
+            if by_framing
+            else "; its levels are no distances, and no line is fitted."
+        )
     pictures.append(
         _picture(
             "total_by_distance",
-            "Total of points against distance" if by_framing else f"Total of points at each {codebook.level}",
+            "Total of points against distance"
+            if by_framing
+            else f"Total of points at each {codebook.level}",
             f"Points given at each {codebook.level} (thesis, figure 5.5)" + fitted,
-            "; ".join(f"{label}: {points}" for label, points in zip(framings, totals.total, strict=True)),
+            "; ".join(
+                f"{label}: {points}" for label, points in zip(framings, totals.total, strict=True)
+            ),
             _total_by_distance,
             totals,
             framings,
@@ -395,14 +519,18 @@ def draw_responses(
             _picture(
                 f"preferences_{slugs[framing]}",
                 f"Each technique against each other one: {where}",
-                "How the answers divide (thesis, figures 5.6, 5.7a and 5.9). Bars to the left: the technique in the "
-                "panel's title was preferred; to the right: the one in the row. Numbers in the bars count answers.",
+                "How the answers divide (thesis, figures 5.6, 5.7a and 5.9). Bars to the "
+                "left: the technique in the "
+                "panel's title was preferred; to the right: the one in the row. Numbers in "
+                "the bars count answers.",
                 "; ".join(
                     f"{codebook.label(row.technique)} against {codebook.label(row.opponent)}: "
-                    f"{row.strong_technique} strong and {row.slight_technique} slight for the first, {row.none} none, "
+                    f"{row.strong_technique} strong and {row.slight_technique} slight for the "
+                    f"first, {row.none} none, "
                     f"{row.slight_opponent} slight and {row.strong_opponent} strong for the second"
                     for row in table.itertuples()
-                    if codebook.techniques.index(row.technique) < codebook.techniques.index(row.opponent)
+                    if codebook.techniques.index(row.technique)
+                    < codebook.techniques.index(row.opponent)
                 ),
                 _preferences,
                 table,
@@ -418,10 +546,12 @@ def draw_responses(
             _picture(
                 "pair",
                 f"{a} against {b} at each {codebook.level}",
-                "Box plot of all answers (thesis, figure 5.7b): box from the lower to the upper quartile, median in orange, "
+                "Box plot of all answers (thesis, figure 5.7b): box from the lower to the "
+                "upper quartile, median in orange, "
                 "whiskers to the extremes, one dot an answer.",
                 "; ".join(
-                    f"{codebook.framing_label(framing)}: {(one < 0).sum()} for {a}, {(one == 0).sum()} none, "
+                    f"{codebook.framing_label(framing)}: {(one < 0).sum()} for {a}, "
+                    f"{(one == 0).sum()} none, "
                     f"{(one > 0).sum()} for {b}, median {np.median(one):g}"
                     for framing, one in values.items()
                 ),
@@ -433,26 +563,39 @@ def draw_responses(
             )
         )
     if found:
-        shares = {framing: dict(zip(responses.items[framing], one.vector, strict=True)) for framing, one in found.items()}
+        shares = {
+            framing: dict(zip(responses.items[framing], one.vector, strict=True))
+            for framing, one in found.items()
+        }
         pictures.append(draw_priorities(shares, found, codebook, simulated))
     return pictures
 
 
 def draw_priorities(
-    shares: Mapping[str, Mapping[str, float]], found: Mapping[str, Priorities], codebook: Codebook, simulated: bool = False
+    shares: Mapping[str, Mapping[str, float]],
+    found: Mapping[str, Priorities],
+    codebook: Codebook,
+    simulated: bool = False,
 ) -> Picture:
     """AHP priorities, one panel a framing. shares: framing -> technique -> priority."""
     used = [name for name in codebook.techniques if any(name in one for one in shares.values())]
     titles = {
-        framing: (codebook.framing_label(framing), "no CR" if one.cr is None else f"CR {one.cr:z.3f}")
+        framing: (
+            codebook.framing_label(framing),
+            "no CR" if one.cr is None else f"CR {one.cr:z.3f}",
+        )
         for framing, one in found.items()
     }
     return _picture(
         "priorities",
         f"AHP priorities per {codebook.level}",
-        "Principal eigenvector of the matrix of judgements, scaled to sum 1 (thesis, table 5.2), with the consistency ratio.",
+        (
+            "Principal eigenvector of the matrix of judgements, scaled to sum 1 (thesis, table "
+            "5.2), with the consistency ratio."
+        ),
         "; ".join(
-            f"{' '.join(titles[framing])}: " + ", ".join(f"{codebook.label(name)} {share:.3f}" for name, share in one.items())
+            f"{' '.join(titles[framing])}: "
+            + ", ".join(f"{codebook.label(name)} {share:.3f}" for name, share in one.items())
             for framing, one in shares.items()
         ),
         _bars,

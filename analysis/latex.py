@@ -4,16 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .figures import SIMULATED
-from .shown import MINUS, NOTHING, Shown
+from analysis.figures import SIMULATED
+from analysis.shown import MINUS, NOTHING, Shown
 
 _ESCAPES = {
-    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", '"': r"\textquotedbl{}",
-    MINUS: r"$-$", NOTHING: "--", "\N{PLUS-MINUS SIGN}": r"$\pm$",
-}  # fmt: skip
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    MINUS: r"$-$",
+    NOTHING: "--",
+    "\N{PLUS-MINUS SIGN}": r"$\pm$",
+}
 
-PREAMBLE = r"""% Tables with booktabs. Compile this file alone, or \input the part between the lines of '%' of one table.
+PREAMBLE = r"""% Tables with booktabs. Compile this file alone, or \input the part between the
+% lines of '%' of one table.
 \documentclass[10pt]{article}
 \usepackage[T1]{fontenc}
 \usepackage[utf8]{inputenc}
@@ -32,7 +47,10 @@ def escape(text: str) -> str:
 
 
 def table(shown: Shown, simulated: bool = False) -> str:
-    """One table as a longtable, which may run over pages. A cell that repeats the one above it in the first column stays empty."""
+    """One table as a longtable, which may run over pages.
+
+    A cell that repeats the one above it in the first column stays empty.
+    """
     columns = "".join("r" if numeric else "l" for numeric in shown.numeric)
     caption = escape(f"{SIMULATED}. {shown.caption}" if simulated else shown.caption)
     head = " & ".join(escape(name) for name in shown.columns)
@@ -40,7 +58,8 @@ def table(shown: Shown, simulated: bool = False) -> str:
     lines = [
         f"% {shown.name}",
         rf"\begin{{longtable}}{{@{{}}{columns}@{{}}}}",
-        rf"\caption{{{caption}{'. ' + note if note else ''}}}\label{{tab:{escape_label(shown.name)}}}\\",
+        rf"\caption{{{caption}{'. ' + note if note else ''}}}"
+        rf"\label{{tab:{escape_label(shown.name)}}}\\",
         rf"\toprule {head} \\ \midrule \endfirsthead",
         rf"\toprule {head} \\ \midrule \endhead",
         r"\bottomrule \endlastfoot",
@@ -52,7 +71,9 @@ def table(shown: Shown, simulated: bool = False) -> str:
             lines.append(r"\addlinespace")
         cells[0] = cells[0] if row[0] != above else ""
         # a cell that begins with a bracket would be read as the length of \\
-        lines.append(" & ".join("{}" + cell if cell.startswith("[") else cell for cell in cells) + r" \\")
+        lines.append(
+            " & ".join("{}" + cell if cell.startswith("[") else cell for cell in cells) + r" \\"
+        )
         above = row[0]
     return "\n".join([*lines, r"\end{longtable}", ""])
 
@@ -66,4 +87,6 @@ def document(tables: Iterable[Shown], title: str, simulated: bool = False) -> st
     size = [r"\footnotesize" + "\n", rf"\section*{{{escape(title)}}}" + "\n"]
     if simulated:
         size.append(rf"\noindent\textbf{{{SIMULATED}}}: every answer was made by a program." + "\n")
-    return "\n".join([PREAMBLE, *size, *(table(one, simulated) for one in tables), r"\end{document}", ""])
+    return "\n".join(
+        [PREAMBLE, *size, *(table(one, simulated) for one in tables), r"\end{document}", ""]
+    )

@@ -1,4 +1,6 @@
-"""methods.md: the paragraph for the paper. Every choice, with its source, the versions and the seed."""
+"""methods.md: the paragraph for the paper. Every choice, with its source, the versions and the
+seed.
+"""
 
 from __future__ import annotations
 
@@ -6,31 +8,73 @@ import platform
 from collections.abc import Mapping
 from importlib import metadata
 
-from .codebook import FRAMING
-from .conclusions import count
-from .options import Options
-from .responses import Responses
-from .shown import alpha_of
-from .worth import FEW_ANSWERS, NO_TASTE, QUADRATURE_ITEMS
+from analysis.codebook import FRAMING
+from analysis.conclusions import count
+from analysis.options import Options
+from analysis.responses import Responses
+from analysis.shown import alpha_of
+from analysis.worth import FEW_ANSWERS, NO_TASTE, QUADRATURE_ITEMS
 
 #: Key -> reference, as it is cited.
 REFERENCES = {
     "saaty1980": "Saaty, T. L. (1980). The Analytic Hierarchy Process. McGraw-Hill.",
-    "bradley1952": "Bradley, R. A. and Terry, M. E. (1952). Rank analysis of incomplete block designs I. Biometrika 39(3/4), 324-345. doi:10.2307/2334029",
-    "davidson1970": "Davidson, R. R. (1970). On extending the Bradley-Terry model to accommodate ties in paired comparison experiments. JASA 65(329), 317-328. doi:10.1080/01621459.1970.10481082",
-    "thurstone1927": "Thurstone, L. L. (1927). A law of comparative judgment. Psychological Review 34(4), 273-286. doi:10.1037/h0070288",
-    "perezortiz2017": "Perez-Ortiz, M. and Mantiuk, R. K. (2017). A practical guide and software for analysing pairwise comparison experiments. arXiv:1712.03686",
-    "agresti1992": "Agresti, A. (1992). Analysis of ordinal paired comparison data. Applied Statistics 41(2), 287-297. doi:10.2307/2347562",
-    "wilcoxon1945": "Wilcoxon, F. (1945). Individual comparisons by ranking methods. Biometrics Bulletin 1(6), 80-83. doi:10.2307/3001968",
-    "holm1979": "Holm, S. (1979). A simple sequentially rejective multiple test procedure. Scandinavian Journal of Statistics 6(2), 65-70.",
-    "schuirmann1987": "Schuirmann, D. J. (1987). A comparison of the two one-sided tests procedure and the power approach. J. Pharmacokinetics and Biopharmaceutics 15, 657-680. doi:10.1007/BF01068419",
-    "kendall1940": "Kendall, M. G. and Babington Smith, B. (1940). On the method of paired comparisons. Biometrika 31(3/4), 324-345. doi:10.2307/2332613",
+    "bradley1952": (
+        "Bradley, R. A. and Terry, M. E. (1952). Rank analysis of incomplete "
+        "block designs I. Biometrika 39(3/4), 324-345. doi:10.2307/2334029"
+    ),
+    "davidson1970": (
+        "Davidson, R. R. (1970). On extending the Bradley-Terry model to "
+        "accommodate ties in paired comparison experiments. JASA 65(329), 317-328. "
+        "doi:10.1080/01621459.1970.10481082"
+    ),
+    "thurstone1927": (
+        "Thurstone, L. L. (1927). A law of comparative judgment. Psychological "
+        "Review 34(4), 273-286. doi:10.1037/h0070288"
+    ),
+    "perezortiz2017": (
+        "Perez-Ortiz, M. and Mantiuk, R. K. (2017). A practical guide and "
+        "software for analysing pairwise comparison experiments. arXiv:1712.03686"
+    ),
+    "agresti1992": (
+        "Agresti, A. (1992). Analysis of ordinal paired comparison data. Applied "
+        "Statistics 41(2), 287-297. doi:10.2307/2347562"
+    ),
+    "wilcoxon1945": (
+        "Wilcoxon, F. (1945). Individual comparisons by ranking methods. "
+        "Biometrics Bulletin 1(6), 80-83. doi:10.2307/3001968"
+    ),
+    "holm1979": (
+        "Holm, S. (1979). A simple sequentially rejective multiple test procedure. "
+        "Scandinavian Journal of Statistics 6(2), 65-70."
+    ),
+    "schuirmann1987": (
+        "Schuirmann, D. J. (1987). A comparison of the two one-sided tests "
+        "procedure and the power approach. J. Pharmacokinetics and Biopharmaceutics 15, "
+        "657-680. doi:10.1007/BF01068419"
+    ),
+    "kendall1940": (
+        "Kendall, M. G. and Babington Smith, B. (1940). On the method of paired "
+        "comparisons. Biometrika 31(3/4), 324-345. doi:10.2307/2332613"
+    ),
     "krippendorff2013": "Krippendorff, K. (2013). Content Analysis, 3rd ed. Sage, section 12.3.",
-    "page1963": "Page, E. B. (1963). Ordered hypotheses for multiple treatments: a significance test for linear ranks. JASA 58(301), 216-230. doi:10.1080/01621459.1963.10500843",
-    "hesterberg2015": "Hesterberg, T. C. (2015). What teachers should know about the bootstrap. The American Statistician 69(4), 371-386. doi:10.1080/00031305.2015.1089789",
-    "kerby2014": "Kerby, D. S. (2014). The simple difference formula: an approach to teaching nonparametric correlation. Comprehensive Psychology 3. doi:10.2466/11.IT.3.1",
-    "okabe2002": "Okabe, M. and Ito, K. (2002). Color Universal Design: how to make figures and presentations that are friendly to colorblind people.",
-}  # fmt: skip
+    "page1963": (
+        "Page, E. B. (1963). Ordered hypotheses for multiple treatments: a "
+        "significance test for linear ranks. JASA 58(301), 216-230. "
+        "doi:10.1080/01621459.1963.10500843"
+    ),
+    "hesterberg2015": (
+        "Hesterberg, T. C. (2015). What teachers should know about the "
+        "bootstrap. The American Statistician 69(4), 371-386. doi:10.1080/00031305.2015.1089789"
+    ),
+    "kerby2014": (
+        "Kerby, D. S. (2014). The simple difference formula: an approach to "
+        "teaching nonparametric correlation. Comprehensive Psychology 3. doi:10.2466/11.IT.3.1"
+    ),
+    "okabe2002": (
+        "Okabe, M. and Ito, K. (2002). Color Universal Design: how to make figures "
+        "and presentations that are friendly to colorblind people."
+    ),
+}
 PACKAGES = ("subdermal", "numpy", "scipy", "pandas", "matplotlib", "typst")
 
 
@@ -50,91 +94,142 @@ def exclusions(options: Options) -> list[str]:
     rules = options.exclusions
     words = {
         "answered_share": "answered less than {:.0%} of the questions",
-        "one_side_share": "preferred one side in at least {:.0%} of decided answers, where that is unlikely by chance (p < 0.001)",
+        "one_side_share": (
+            "preferred one side in at least {:.0%} of decided answers, where "
+            "that is unlikely by chance (p < 0.001)"
+        ),
         "median_rt_ms": "took less than {:g} ms for half of the answers",
         "same_answer_share": "gave one and the same answer at least {:.0%} of the time",
         "zeta": "had a coefficient of consistency below {:g}",
         "repeat_share": "chose the same direction less than {:.0%} of the time when asked again",
     }
     return [
-        text.format(getattr(rules, name)).replace("%", " %") for name, text in words.items() if getattr(rules, name) is not None
+        text.format(getattr(rules, name)).replace("%", " %")
+        for name, text in words.items()
+        if getattr(rules, name) is not None
     ]
 
 
 def paragraphs(responses: Responses, options: Options, declared: str) -> list[tuple[str, str]]:
-    """(heading, text) in the order of the paper; references as [key]. declared: where margins and rules come from."""
+    """(heading, text) in the order of the paper; references as [key]. declared: where margins and
+    rules come from.
+    """
     frame, alpha = responses.frame, alpha_of(options)
-    kind = "SIMULATED participants (programs, not people)" if responses.simulated else "participants"
+    kind = (
+        "SIMULATED participants (programs, not people)" if responses.simulated else "participants"
+    )
     pairs = sum(len(items) * (len(items) - 1) // 2 for items in responses.items.values())
     codebook = responses.codebook
     asked = len(frame[["framing", "a", "b"]].drop_duplicates())
     present = {name for items in responses.items.values() for name in items}
-    names = ", ".join(responses.codebook.label(name) for name in responses.codebook.techniques if name in present)
+    names = ", ".join(
+        responses.codebook.label(name) for name in responses.codebook.techniques if name in present
+    )
     unused = len(responses.findings)
-    rows = "every row of the table was used" if not unused else f"{count(unused, 'row')} of the table could not be used"
+    rows = (
+        "every row of the table was used"
+        if not unused
+        else f"{count(unused, 'row')} of the table could not be used"
+    )
+    together = options.family == "study"
+    family = f"all {codebook.levels} together" if together else f"each {codebook.level}"
     found = [
         (
             "Answers",
-            f"{responses.participants} {kind} compared images in pairs: {names}; at {codebook.counted(len(responses.items))} "
-            f"({', '.join(responses.codebook.framing_label(name) for name in responses.items)}), {asked} of {pairs} pairs in all. They "
-            "answered on a scale from \N{MINUS SIGN}2 (strong preference for the left image) over 0 (no difference seen) to 2 (strong "
+            f"{responses.participants} {kind} compared images in pairs: {names}; at "
+            f"{codebook.counted(len(responses.items))} "
+            f"({', '.join(responses.codebook.framing_label(name) for name in responses.items)}), "
+            f"{asked} of {pairs} pairs in all. They "
+            "answered on a scale from \N{MINUS SIGN}2 (strong preference for the left image) "
+            "over 0 (no difference seen) to 2 (strong "
             f"preference for the right one). {len(frame)} answers were analysed; {rows}. "
-            "Sides and order were as the table gives them; answers were turned to the pair before anything was computed.",
+            "Sides and order were as the table gives them; answers were turned to the pair "
+            "before anything was computed.",
         ),
         *([("Grouping", " ".join(responses.grouping))] if responses.grouping else []),
         (
             "Scores and priorities",
-            "A strong preference gives two points, a slight one gives one. For the Analytic Hierarchy Process [saaty1980] the answers 0, 1 "
-            "and 2 are the judgements 1, 2 and 3, or their reciprocals. Judgements were put together over people by the median, taken above "
-            f"the diagonal in the order {names} and inverted below it, and by the geometric mean; priorities are the principal eigenvector "
-            "and, beside it, the geometric means of the rows; CR uses Saaty's random index for up to 10 techniques.",
+            "A strong preference gives two points, a slight one gives one. For the Analytic "
+            "Hierarchy Process [saaty1980] the answers 0, 1 "
+            "and 2 are the judgements 1, 2 and 3, or their reciprocals. Judgements were put "
+            "together over people by the median, taken above "
+            f"the diagonal in the order {names} and inverted below it, and by the geometric "
+            "mean; priorities are the principal eigenvector "
+            "and, beside it, the geometric means of the rows; CR uses Saaty's random index "
+            "for up to 10 techniques.",
         ),
         (
             "Worths",
-            f"Worths, centred on 0 within a {codebook.level}, were estimated in four models: Bradley-Terry [bradley1952] and Thurstone's case V "
-            "[thurstone1927] in just-objectionable differences (1 JOD: 75 % prefer one of the two) [perezortiz2017], with 'no difference' "
+            f"Worths, centred on 0 within a {codebook.level}, were estimated in four models: "
+            "Bradley-Terry [bradley1952] and Thurstone's case V "
+            "[thurstone1927] in just-objectionable differences (1 JOD: 75 % prefer one of "
+            "the two) [perezortiz2017], with 'no difference' "
             + ("as half a preference each way" if options.ties == "half" else "left out")
-            + "; Davidson's model, in which ties are an outcome of their own [davidson1970]; and a cumulative-logit model of all five answers "
-            "[agresti1992] with a fixed side effect and random effects of participants for techniques and side, by Laplace's approximation "
-            f"(by adaptive Gauss-Hermite quadrature for up to {QUADRATURE_ITEMS} techniques and at most {FEW_ANSWERS} answers a person; without "
+            + "; Davidson's model, in which ties are an outcome of their own [davidson1970]; "
+            "and a cumulative-logit model of all five answers "
+            "[agresti1992] with a fixed side effect and random effects of participants for "
+            "techniques and side, by Laplace's approximation "
+            f"(by adaptive Gauss-Hermite quadrature for up to {QUADRATURE_ITEMS} techniques "
+            f"and at most {FEW_ANSWERS} answers a person; without "
             f"random effects where nobody gave more than {NO_TASTE} answers). "
-            f"Models fitted: {', '.join(options.models)}. All are maximum likelihood; where it has no finite maximum no worth is given.",
+            f"Models fitted: {', '.join(options.models)}. All are maximum likelihood; where "
+            "it has no finite maximum no worth is given.",
         ),
         (
             "Intervals",
-            f"Intervals are at {100 * options.level:g} %. They resample participants, with all of their answers, {options.resamples} times "
-            f"(seed {options.seed}) and are expanded percentile intervals [hesterberg2015]; those of the ordinal model are Wald's, those of "
+            f"Intervals are at {100 * options.level:g} %. They resample participants, with "
+            f"all of their answers, {options.resamples} times "
+            f"(seed {options.seed}) and are expanded percentile intervals [hesterberg2015]; "
+            "those of the ordinal model are Wald's, those of "
             "Kendall's u and Krippendorff's alpha are jackknifed over participants.",
         ),
         (
             "Differences",
-            "Each pair was tested on participants, one value a person, by Wilcoxon's signed-rank test [wilcoxon1945] (zeros dropped, ties with "
-            "mean ranks, exact up to 50 people with a preference, then the normal approximation with ties corrected and no continuity "
+            "Each pair was tested on participants, one value a person, by Wilcoxon's "
+            "signed-rank test [wilcoxon1945] (zeros dropped, ties with "
+            "mean ranks, exact up to 50 people with a preference, then the normal "
+            "approximation with ties corrected and no continuity "
             "correction) and by the exact two-sided sign test. The declared test is the "
-            f"{'Wilcoxon test' if options.test == 'wilcoxon' else 'sign test'}, corrected by Holm's procedure [holm1979] over the pairs of "
-            f"{f'all {codebook.levels} together' if options.family == 'study' else f'each {codebook.level}'}, at {alpha:g}. Effect sizes are the matched-pairs "
+            f"{'Wilcoxon test' if options.test == 'wilcoxon' else 'sign test'}, corrected by "
+            "Holm's procedure [holm1979] over the pairs of "
+            f"{family}, at {alpha:g}. Effect sizes are the matched-pairs "
             "rank-biserial correlation [kerby2014] and the standardised mean difference.",
         ),
         ("Equivalence", _equivalence(options, alpha, declared)),
         (
             "Agreement and quality",
-            "Consistency is by circular triads and zeta [kendall1940], agreement by Kendall's u [kendall1940] (chi-square test where everyone "
-            "answered every pair without ties; else by flipping decided answers) and Krippendorff's ordinal alpha [krippendorff2013], all on "
+            "Consistency is by circular triads and zeta [kendall1940], agreement by "
+            "Kendall's u [kendall1940] (chi-square test where everyone "
+            "answered every pair without ties; else by flipping decided answers) and "
+            "Krippendorff's ordinal alpha [krippendorff2013], all on "
             "answers turned to the pair. "
             + (
-                "The trend over framings is the slope of each person's mean strength of preference, and Page's L [page1963]. "
+                (
+                    "The trend over framings is the slope of each person's mean strength of "
+                    "preference, and Page's L [page1963]. "
+                )
                 if codebook.factor == FRAMING
                 else ""
             )
-            + "Familiarity was set against each person's preference for a technique by Spearman's correlation, Holm-corrected.",
+            + (
+                "Familiarity was set against each person's preference for a technique by "
+                "Spearman's correlation, Holm-corrected."
+            ),
         ),
         (
             "Exclusions",
-            f"Everyone is counted. Every conclusion was computed again without those who {'; or '.join(exclusions(options))} ({declared})."
+            (
+                "Everyone is counted. Every conclusion was computed again without those who "
+                f"{'; or '.join(exclusions(options))} ({declared})."
+            )
             if exclusions(options)
             else f"Everyone is counted; no rule of exclusion was declared ({declared}).",
         ),
-        ("Software", ", ".join(f"{name} {version}" for name, version in versions().items()) + ". Figures use the palette of [okabe2002]."),
+        (
+            "Software",
+            ", ".join(f"{name} {version}" for name, version in versions().items())
+            + ". Figures use the palette of [okabe2002].",
+        ),
     ]
     return found
 
@@ -143,7 +238,13 @@ def markdown(responses: Responses, options: Options, declared: str, command: str
     """methods.md."""
     lines = ["# Methods", ""]
     if responses.simulated:
-        lines += ["**SIMULATED ANSWERS.** These answers were made by a program; this text describes how they were analysed.", ""]
+        lines += [
+            (
+                "**SIMULATED ANSWERS.** These answers were made by a program; this text "
+                "describes how they were analysed."
+            ),
+            "",
+        ]
     parts = paragraphs(responses, options, declared)
     for heading, text in parts:
         lines += [f"**{heading}.** {text}", ""]
@@ -151,7 +252,9 @@ def markdown(responses: Responses, options: Options, declared: str, command: str
         lines += [f"Command: `{command}`; table sha256 `{responses.sha256}`.", ""]
     lines += ["## References", ""]
     used = "".join(text for _, text in parts)
-    lines += [f"- [{key}] {reference}" for key, reference in REFERENCES.items() if f"[{key}]" in used]
+    lines += [
+        f"- [{key}] {reference}" for key, reference in REFERENCES.items() if f"[{key}]" in used
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -164,17 +267,25 @@ def cited(text: str, order: Mapping[str, int]) -> str:
 
 def _equivalence(options: Options, alpha: float, declared: str) -> str:
     if not options.margin and not options.margin_jod:
-        return f"No margin of equivalence was declared ({declared}), so that no equivalence was tested."
+        return (
+            f"No margin of equivalence was declared ({declared}), so that no equivalence "
+            "was tested."
+        )
     words = []
     if options.margin:
         words.append(
-            f"Two techniques are called as good as each other where two one-sided t tests [schuirmann1987] at {alpha:g} and the "
-            f"{100 * (1 - 2 * alpha):g} % bootstrap interval both put the mean preference within \N{PLUS-MINUS SIGN}{options.margin:g} points, the tests corrected by Holm's "
+            "Two techniques are called as good as each other where two one-sided t tests "
+            f"[schuirmann1987] at {alpha:g} and the "
+            f"{100 * (1 - 2 * alpha):g} % bootstrap interval both put the mean preference "
+            f"within \N{PLUS-MINUS SIGN}{options.margin:g} points, the tests corrected by Holm's "
             "procedure like those of difference"
         )
     if options.margin_jod:
-        words.append(
-            f"{'the difference in JOD is set against' if words else 'Two techniques are called as good as each other where the bootstrap interval of their difference in JOD is within'} "
-            f"\N{PLUS-MINUS SIGN}{options.margin_jod:g} JOD"
+        set_against = (
+            "the difference in JOD is set against"
+            if words
+            else "Two techniques are called as good as each other where the bootstrap interval of "
+            "their difference in JOD is within"
         )
+        words.append(f"{set_against} \N{PLUS-MINUS SIGN}{options.margin_jod:g} JOD")
     return "; ".join(words) + f" ({declared})."

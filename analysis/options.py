@@ -1,10 +1,12 @@
-"""What the analyst decides before the numbers are seen: resamples, seed, level, margins, the declared test, the exclusions."""
+"""What the analyst decides before the numbers are seen: resamples, seed, level, margins, the
+declared test, the exclusions.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .errors import InputError
+from analysis.errors import InputError
 
 #: Name of the rows in which all framings are taken together.
 OVERALL = "overall"
@@ -14,14 +16,16 @@ FEWEST_PEOPLE = 5
 
 @dataclass(frozen=True)
 class Exclusions:
-    """Rules under which a participant is left out in the second pass of `agreement.sensitivity`, and nowhere else; None: no rule.
+    """Rules under which a participant is left out in the second pass of `agreement.sensitivity`,
+    and nowhere else; None: no rule.
 
     answered_share      leave out who answered less than this share of the study's questions, 0 to 1
-    one_side_share      ... who chose one side in at least this share of decided answers, 0 to 1, where that is unlikely by
-                        chance (two-sided binomial p below 0.001)
+    one_side_share      ... who chose one side in at least this share of decided answers, 0 to 1,
+                        where that is unlikely by chance (two-sided binomial p below 0.001)
     median_rt_ms        ... whose median answer took less than this, milliseconds
     same_answer_share   ... who gave one and the same answer this often, 0 to 1
-    zeta                ... whose coefficient of consistency, averaged over framings, is below this, at most 1
+    zeta                ... whose coefficient of consistency, averaged over framings, is below this,
+                        at most 1
     repeat_share        ... who, asked again, chose the same direction less often than this, 0 to 1
     """
 
@@ -46,12 +50,14 @@ class Options:
     resamples   participants are resampled this often, from 100
     seed        of every random number in the analysis, from 0
     level       of the intervals, between 0.5 and 1
-    margin      two techniques are as good as each other where the mean preference is within +-margin, points on the scale
-                from -2 to 2, above 0; None: no equivalence is tested
+    margin      two techniques are as good as each other where the mean preference is within
+                +-margin, points on the scale from -2 to 2, above 0; None: no equivalence is tested
     margin_jod  the same for the difference in JOD, above 0
     test        'wilcoxon' or 'sign': the declared test, which Holm's correction is applied to
-    family      'study': Holm over all pairs of all framings together; 'framing': over the pairs of one framing
-    ties        how bradley_terry and thurstone_jod take 'no difference': 'half' a win for each, or 'drop'
+    family      'study': Holm over all pairs of all framings together; 'framing': over the pairs of
+                one framing
+    ties        how bradley_terry and thurstone_jod take 'no difference': 'half' a win for each, or
+                'drop'
     models      the models of worth to fit
     exclusions  see `Exclusions`
     """
@@ -73,18 +79,32 @@ class Options:
             if not isinstance(value, int) or isinstance(value, bool) or value < least:
                 raise InputError(f"{name} is {value!r}, expected an integer from {least}")
         if not 0.5 < self.level < 1:
-            raise InputError(f"level is {self.level!r}, expected a number between 0.5 and 1, such as 0.95")
+            raise InputError(
+                f"level is {self.level!r}, expected a number between 0.5 and 1, such as 0.95"
+            )
         for name in ("margin", "margin_jod"):
             value = getattr(self, name)
             if value is not None and not 0 < value < float("inf"):
                 raise InputError(f"{name} is {value!r}, expected a number above 0")
-        for name, known in (("test", ("wilcoxon", "sign")), ("family", ("study", "framing")), ("ties", ("half", "drop"))):
+        for name, known in (
+            ("test", ("wilcoxon", "sign")),
+            ("family", ("study", "framing")),
+            ("ties", ("half", "drop")),
+        ):
             if getattr(self, name) not in known:
-                raise InputError(f"{name} is {getattr(self, name)!r}, expected one of {', '.join(known)}")
-        unknown = [name for name in self.models if name not in Options.__dataclass_fields__["models"].default]
+                raise InputError(
+                    f"{name} is {getattr(self, name)!r}, expected one of {', '.join(known)}"
+                )
+        unknown = [
+            name
+            for name in self.models
+            if name not in Options.__dataclass_fields__["models"].default
+        ]
         if unknown:
             known = ", ".join(Options.__dataclass_fields__["models"].default)
-            raise InputError(f"models names the unknown {', '.join(unknown)}; expected some of {known}")
+            raise InputError(
+                f"models names the unknown {', '.join(unknown)}; expected some of {known}"
+            )
 
 
 def _within(name: str, value: float | None, low: float, high: float) -> None:

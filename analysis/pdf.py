@@ -1,7 +1,9 @@
-"""report.pdf: the report on paper, set by Typst, with embedded fonts; no browser and no LaTeX are needed.
+"""report.pdf: the report on paper, set by Typst, with embedded fonts; no browser and no LaTeX are
+needed.
 
-The layout is templates/report/report.typ. Words go there as data, never as markup, so that no name in a table can change it. The fonts are
-those that come with typst and matplotlib, whatever the machine has: the same input gives the same bytes.
+The layout is templates/report/report.typ. Words go there as data, never as markup, so that no name
+in a table can change it. The fonts are those that come with typst and matplotlib, whatever the
+machine has: the same input gives the same bytes.
 """
 
 from __future__ import annotations
@@ -16,8 +18,8 @@ from pathlib import Path
 import matplotlib
 import typst
 
-from .figures import DOUBLE_MM, SIMULATED, Picture
-from .shown import Shown
+from analysis.figures import DOUBLE_MM, SIMULATED, Picture
+from analysis.shown import Shown
 
 TEMPLATE = Path(__file__).resolve().parents[1] / "templates" / "report" / "report.typ"
 #: Width of the text on the page, mm.
@@ -43,7 +45,11 @@ def make(
             "title": title,
             "subtitle": subtitle,
             "mark": SIMULATED if simulated else "",
-            "summary": [{"heading": heading, "sentences": list(sentences)} for heading, sentences in summary if sentences],
+            "summary": [
+                {"heading": heading, "sentences": list(sentences)}
+                for heading, sentences in summary
+                if sentences
+            ],
             "pictures": [
                 {
                     "file": f"{place}.svg",
@@ -61,7 +67,9 @@ def make(
         (root / "report.json").write_text(json.dumps(data, ensure_ascii=False), encoding="utf-8")
         (root / "report.typ").write_bytes(TEMPLATE.read_bytes())
         fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-        return typst.compile(str(root / "report.typ"), root=folder, font_paths=[str(fonts)], ignore_system_fonts=True)
+        return typst.compile(
+            str(root / "report.typ"), root=folder, font_paths=[str(fonts)], ignore_system_fonts=True
+        )
 
 
 def _width_mm(svg: bytes) -> float:

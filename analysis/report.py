@@ -1,7 +1,8 @@
-"""Puts tables, figures and words together: `tables/*.csv`, `figures/*.pdf`, `.svg` and `.png`, `report.tex`, `methods.md`, `report.pdf`
-and `report.html`, one page to read.
+"""Puts tables, figures and words together: `tables/*.csv`, `figures/*.pdf`, `.svg` and `.png`,
+`report.tex`, `methods.md`, `report.pdf` and `report.html`, one page to read.
 
-Everything is made in memory first and then written file by file, each one whole or not at all; the report comes last.
+Everything is made in memory first and then written file by file, each one whole or not at all; the
+report comes last.
 """
 
 from __future__ import annotations
@@ -17,22 +18,36 @@ import jinja2
 import numpy as np
 import pandas as pd
 
-from . import ahp, compute, conclusions, figures, latex, methods, objective, shown, tallies, worth_figures
-from .ahp import Comparison, Priorities
-from .codebook import FRAMING, Codebook
-from .conclusions import count as _count
-from .conclusions import listed as _listed
-from .declared import UNDECLARED
-from .errors import InputError
-from .methods import versions as _versions
-from .objective import Measured
-from .options import Options
-from .responses import Responses
-from .shown import NOTHING
+from analysis import (
+    ahp,
+    compute,
+    conclusions,
+    figures,
+    latex,
+    methods,
+    objective,
+    shown,
+    tallies,
+    worth_figures,
+)
+from analysis.ahp import Comparison, Priorities
+from analysis.codebook import FRAMING, Codebook
+from analysis.conclusions import count as _count
+from analysis.conclusions import listed as _listed
+from analysis.declared import UNDECLARED
+from analysis.errors import InputError
+from analysis.methods import versions as _versions
+from analysis.objective import Measured
+from analysis.options import Options
+from analysis.responses import Responses
+from analysis.shown import NOTHING
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "templates" / "report"
 RULE = "Medians are taken above the diagonal, in this order of techniques, and inverted below it."
-SIMULATED_SENTENCE = "These answers were made by a program: no person was asked, and nothing here says how skin looks."
+SIMULATED_SENTENCE = (
+    "These answers were made by a program: no person was asked, and nothing "
+    "here says how skin looks."
+)
 #: How many unusable rows the page shows; tables/rejected_rows.csv holds all.
 SHOWN_ROWS = 100
 
@@ -47,14 +62,19 @@ def report_responses(
 ) -> dict[str, bytes]:
     """All files of the analysis of a response table: path inside the output folder -> content.
 
-    pair: the two techniques of the box plot; without it golubev and golubev_plus where both are present, else the first two.
-    options: the choices of the analysis, and `declared`, where they come from; measured: what the manifest holds of cost and fidelity.
+    pair: the two techniques of the box plot; without it golubev and golubev_plus where both are
+    present, else the first two. options: the choices of the analysis, and `declared`, where they
+    come from; measured: what the manifest holds of cost and fidelity.
     """
     options = options or Options()
     codebook = responses.codebook
     pair = _pair(responses, pair)
     slugs = file_names(responses.items)
-    scores, totals, sides = tallies.scores(responses), tallies.totals(responses), tallies.sides(responses)
+    scores, totals, sides = (
+        tallies.scores(responses),
+        tallies.totals(responses),
+        tallies.sides(responses),
+    )
     comparisons = ahp.comparisons(responses)
     found = _found(comparisons)
     tables = {
@@ -66,7 +86,10 @@ def report_responses(
         "sides": sides,
         "ahp_priorities": ahp.priorities_table(comparisons),
         "rejected_rows": pd.DataFrame(
-            [(one.line, one.last_line, one.kind, one.reason, one.row) for one in responses.findings],
+            [
+                (one.line, one.last_line, one.kind, one.reason, one.row)
+                for one in responses.findings
+            ],
             columns=["line", "last_line", "kind", "reason", "row"],
         ),
     } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
@@ -74,7 +97,15 @@ def report_responses(
     tables |= results.tables
     beside, correlated, unmeasured = None, None, ()
     if measured is not None and codebook.factor != FRAMING:
-        measured, unmeasured = None, (f"Cost and fidelity are measured per framing and are not set beside worths by {codebook.spoken}.",)
+        measured, unmeasured = (
+            None,
+            (
+                (
+                    "Cost and fidelity are measured per framing and are not set beside worths by "
+                    f"{codebook.spoken}."
+                ),
+            ),
+        )
     if measured is not None:
         beside = objective.against_worth(measured.table, results.tables["worths"])
         correlated = objective.correlations(beside)
@@ -83,7 +114,9 @@ def report_responses(
         tables = {name: table.assign(simulated=1) for name, table in tables.items()}
 
     simulated, alpha = responses.simulated, shown.alpha_of(options)
-    pictures = worth_figures.draw_results(results.tables, codebook, options.margin, alpha, simulated)
+    pictures = worth_figures.draw_results(
+        results.tables, codebook, options.margin, alpha, simulated
+    )
     said = list(unmeasured)
     if measured is not None:
         for measure, rows in beside.groupby("measure", sort=False):
@@ -92,10 +125,15 @@ def report_responses(
         said = objective.sentences(beside, correlated, measured.notes, codebook)
     pictures += figures.draw_responses(responses, found, pair, slugs)
     read = shown.all_shown(results.tables, codebook, options)
-    concluded = conclusions.conclude(results.tables, results.notes, codebook, options, responses.participants, simulated)
+    concluded = conclusions.conclude(
+        results.tables, results.notes, codebook, options, responses.participants, simulated
+    )
     counted = _summary(responses, scores, totals, sides, comparisons, found, pair)
     title = codebook.title or "Answers to pairs of images"
-    subtitle = "Which of two images looks more realistic: what was answered, what follows from it, and what does not."
+    subtitle = (
+        "Which of two images looks more realistic: what was answered, what follows "
+        "from it, and what does not."
+    )
     summary = [
         *([("Simulated", [SIMULATED_SENTENCE])] if simulated else []),
         ("What can be concluded", concluded.can),
@@ -105,15 +143,25 @@ def report_responses(
     ]
     text = methods.paragraphs(responses, options, declared)
     used = "".join(words for _, words in text)
-    cited = {key: place for place, key in enumerate((key for key in methods.REFERENCES if f"[{key}]" in used), start=1)}
+    cited = {
+        key: place
+        for place, key in enumerate(
+            (key for key in methods.REFERENCES if f"[{key}]" in used), start=1
+        )
+    }
     references = [methods.REFERENCES[key] for key in cited]
     numbered = [(heading, methods.cited(words, cited)) for heading, words in text]
     more = {
         "methods.md": methods.markdown(responses, options, declared, command).encode(),
         "report.tex": latex.document(read.values(), title, simulated).encode(),
-        "report.pdf": _pdf(title, subtitle, summary, pictures, list(read.values()), numbered, references, simulated),
+        "report.pdf": _pdf(
+            title, subtitle, summary, pictures, list(read.values()), numbered, references, simulated
+        ),
     }
-    first, last = (f"{time:%Y-%m-%d}" for time in (responses.frame.started_at.min(), responses.frame.started_at.max()))
+    first, last = (
+        f"{time:%Y-%m-%d}"
+        for time in (responses.frame.started_at.min(), responses.frame.started_at.max())
+    )
     return _files(
         tables,
         pictures,
@@ -123,7 +171,10 @@ def report_responses(
         simulated=simulated,
         summary=[(heading, sentences) for heading, sentences in summary if sentences],
         shown=read,
-        remarks={name: [_plain(line, codebook) for line in lines] for name, lines in results.notes.items()},
+        remarks={
+            name: [_plain(line, codebook) for line in lines]
+            for name, lines in results.notes.items()
+        },
         methods=numbered,
         references=references,
         declared=declared,
@@ -136,9 +187,13 @@ def report_responses(
         ],
         scores=_crossed(scores, "score", codebook, list(responses.items)),
         totals=[
-            (codebook.framing_label(row.framing), row.total, row.answers, row.mean_strength) for row in totals.itertuples()
+            (codebook.framing_label(row.framing), row.total, row.answers, row.mean_strength)
+            for row in totals.itertuples()
         ],
-        sides=[(codebook.framing_label(row.framing), row.left, row.none, row.right) for row in sides.itertuples()],
+        sides=[
+            (codebook.framing_label(row.framing), row.left, row.none, row.right)
+            for row in sides.itertuples()
+        ],
         matrices=_matrices(comparisons, found, codebook),
         priorities=_crossed(tables["ahp_priorities"], "priority", codebook, list(responses.items)),
         rule=RULE,
@@ -158,14 +213,20 @@ def report_responses(
     )
 
 
-def report_matrices(comparisons: Mapping[str, Comparison], source: str = "", command: str = "") -> dict[str, bytes]:
+def report_matrices(
+    comparisons: Mapping[str, Comparison], source: str = "", command: str = ""
+) -> dict[str, bytes]:
     """The same for matrices of judgements that were made elsewhere."""
     items = next(iter(comparisons.values())).items
-    codebook = Codebook(tuple(comparisons), items, f"that of items in {source}", f"that of {source}")
+    codebook = Codebook(
+        tuple(comparisons), items, f"that of items in {source}", f"that of {source}"
+    )
     found = _found(comparisons)
     slugs = file_names(comparisons)
     table = ahp.priorities_table(comparisons)
-    tables = {"ahp_priorities": table} | {f"ahp_matrix_{slugs[name]}": _matrix_table(one) for name, one in comparisons.items()}
+    tables = {"ahp_priorities": table} | {
+        f"ahp_matrix_{slugs[name]}": _matrix_table(one) for name, one in comparisons.items()
+    }
     shares = {name: dict(zip(items, one.vector, strict=True)) for name, one in found.items()}
     return _files(
         tables,
@@ -178,7 +239,8 @@ def report_matrices(comparisons: Mapping[str, Comparison], source: str = "", com
             (
                 "",
                 [
-                    f"{codebook.framing_label(name)}: highest priority for {_listed(_first(share, codebook))}, "
+                    f"{codebook.framing_label(name)}: highest priority for "
+                    f"{_listed(_first(share, codebook))}, "
                     f"{max(share.values()):.3f}. {_coherence(found[name])}"
                     for name, share in shares.items()
                 ],
@@ -215,11 +277,16 @@ def write_files(files: Mapping[str, bytes], out: str | Path) -> None:
                 os.unlink(part)
                 raise
     except OSError as error:
-        raise InputError(f"{error.filename or out}: cannot be written: {error.strerror}; expected a folder for --out") from None
+        raise InputError(
+            f"{error.filename or out}: cannot be written: {error.strerror}; expected a folder "
+            "for --out"
+        ) from None
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """Name -> a file name of its own, on any file system: letters, digits, '.', '_', '-', told apart whatever the case."""
+    """Name -> a file name of its own, on any file system: letters, digits, '.', '_', '-', told
+    apart whatever the case.
+    """
     slugs: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:
@@ -234,10 +301,15 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def _files(
-    tables: Mapping[str, pd.DataFrame], pictures: list[figures.Picture], more: Mapping[str, bytes], **page: object
+    tables: Mapping[str, pd.DataFrame],
+    pictures: list[figures.Picture],
+    more: Mapping[str, bytes],
+    **page: object,
 ) -> dict[str, bytes]:
     files = {
-        f"tables/{name}.csv": table.to_csv(index=False, float_format="%.10g", lineterminator="\n").encode()
+        f"tables/{name}.csv": table.to_csv(
+            index=False, float_format="%.10g", lineterminator="\n"
+        ).encode()
         for name, table in tables.items()
     }
     for picture in pictures:
@@ -250,15 +322,22 @@ def _files(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["inline"] = lambda svg: "data:image/svg+xml;base64," + base64.b64encode(svg).decode()
+    environment.filters["inline"] = lambda svg: (
+        "data:image/svg+xml;base64," + base64.b64encode(svg).decode()
+    )
     environment.filters["digits"] = _digits
-    page = {"versions": _versions(), "files": sorted(files), "pictures": {one.name: one for one in pictures}, **page}
+    page = {
+        "versions": _versions(),
+        "files": sorted(files),
+        "pictures": {one.name: one for one in pictures},
+        **page,
+    }
     files["report.html"] = environment.get_template("report.html").render(page).encode()
     return files
 
 
 def _pdf(*parts: object) -> bytes:
-    from . import pdf
+    from analysis import pdf
 
     return pdf.make(*parts)
 
@@ -278,17 +357,25 @@ def _digits(value: float | None, digits: int = 3) -> str:
 
 def _pair(responses: Responses, pair: tuple[str, str] | None) -> tuple[str, str]:
     """The pair of the box plot, checked."""
-    present = [name for name in responses.codebook.techniques if any(name in items for items in responses.items.values())]
+    present = [
+        name
+        for name in responses.codebook.techniques
+        if any(name in items for items in responses.items.values())
+    ]
     if pair is None:
         known = ("golubev", "golubev_plus")
         return known if set(known) <= set(present) else tuple(present[:2])
     if len(pair) != 2 or pair[0] == pair[1] or not set(pair) <= set(present):
-        raise InputError(f"the pair is {','.join(pair)!r}, expected two different ones of {', '.join(present)}")
+        raise InputError(
+            f"the pair is {','.join(pair)!r}, expected two different ones of {', '.join(present)}"
+        )
     return tuple(pair)
 
 
 def _found(comparisons: Mapping[str, Comparison]) -> dict[str, Priorities]:
-    return {name: ahp.priorities(one.matrix) for name, one in comparisons.items() if not one.missing}
+    return {
+        name: ahp.priorities(one.matrix) for name, one in comparisons.items() if not one.missing
+    }
 
 
 def _matrix_table(comparison: Comparison) -> pd.DataFrame:
@@ -297,12 +384,16 @@ def _matrix_table(comparison: Comparison) -> pd.DataFrame:
     return table
 
 
-def _matrices(comparisons: Mapping[str, Comparison], found: Mapping[str, Priorities], codebook: Codebook) -> list[dict]:
+def _matrices(
+    comparisons: Mapping[str, Comparison], found: Mapping[str, Priorities], codebook: Codebook
+) -> list[dict]:
     return [
         {
             "framing": codebook.framing_label(name),
             "items": [codebook.label(item) for item in one.items],
-            "rows": [["" if np.isnan(cell) else f"{cell:.4g}" for cell in row] for row in one.matrix],
+            "rows": [
+                ["" if np.isnan(cell) else f"{cell:.4g}" for cell in row] for row in one.matrix
+            ],
             "missing": [f"{codebook.label(a)} with {codebook.label(b)}" for a, b in one.missing],
             "found": found.get(name),
         }
@@ -316,7 +407,10 @@ def _crossed(table: pd.DataFrame, column: str, codebook: Codebook, framings: lis
     used = [name for name in codebook.techniques if name in set(table.technique)]
     return {
         "framings": [codebook.framing_label(name) for name in framings],
-        "rows": [(codebook.label(name), [cells.get((name, framing)) for framing in framings]) for name in used],
+        "rows": [
+            (codebook.label(name), [cells.get((name, framing)) for framing in framings])
+            for name in used
+        ],
     }
 
 
@@ -332,10 +426,15 @@ def _summary(
     """What the numbers say, in sentences that hold for these answers and claim no more."""
     codebook, frame = responses.codebook, responses.frame
     sentences = []
-    people = _count(responses.participants, "simulated participant" if responses.simulated else "participant")
+    people = _count(
+        responses.participants, "simulated participant" if responses.simulated else "participant"
+    )
     unused = f"{_count(len(responses.findings), 'row')} of the table could not be used; see below."
     sentences.append(
-        f"{people} gave {_count(len(frame), 'answer')} at {codebook.counted(len(responses.items))}. "
+        (
+            f"{people} gave {_count(len(frame), 'answer')} at "
+            f"{codebook.counted(len(responses.items))}. "
+        )
         + (unused if responses.findings else "Every row of the table is counted.")
     )
     for framing, rows in scores.groupby("framing", sort=False):
@@ -345,9 +444,13 @@ def _summary(
         if most == fewest:
             words += f"all techniques have {_count(most, 'point')}."
         else:
-            best, last = _first(points, codebook), [codebook.label(name) for name in points if points[name] == fewest]
+            best, last = (
+                _first(points, codebook),
+                [codebook.label(name) for name in points if points[name] == fewest],
+            )
             words += (
-                f"{_listed(best)} got the most points ({most}{' each' if len(best) > 1 else ''} of {total}), "
+                f"{_listed(best)} got the most points "
+                f"({most}{' each' if len(best) > 1 else ''} of {total}), "
                 f"{_listed(last)} the fewest ({fewest}{' each' if len(last) > 1 else ''})."
             )
             if framing in found:
@@ -356,11 +459,17 @@ def _summary(
                 if len(top) == len(shares):
                     words += " The AHP priorities put none before another."
                 else:
-                    words += f" The AHP priorities put {_listed(top)} first{' too' if top == best else ''}."
+                    words += (
+                        f" The AHP priorities put {_listed(top)} "
+                        f"first{' too' if top == best else ''}."
+                    )
         if framing in found:
             words += f" {_coherence(found[framing])}"
         elif comparisons[framing].missing:
-            words += f" No priorities: {_count(len(comparisons[framing].missing), 'pair')} had no answer."
+            words += (
+                f" No priorities: {_count(len(comparisons[framing].missing), 'pair')} "
+                "had no answer."
+            )
         sentences.append(words)
     if len(totals) > 1:
         strength = totals.mean_strength.to_numpy()
@@ -369,14 +478,18 @@ def _summary(
         if (steps < 0).all() or (steps > 0).all():
             way = f"get {'weaker' if steps[0] < 0 else 'stronger'} with every step"
         values = ", ".join(
-            f"{row.mean_strength:.2f} ({codebook.framing_label(row.framing)})" for row in totals.itertuples()
+            f"{row.mean_strength:.2f} ({codebook.framing_label(row.framing)})"
+            for row in totals.itertuples()
         )
         path = "From near to far" if codebook.near_to_far else "From framing to framing"
         path = f"{path}, preferences {way}: on" if codebook.factor == FRAMING else "On"
         sentences.append(f"{path} average an answer gave {values} points, of at most 2.")
     a, b = (codebook.label(name) for name in pair)
     values = "; ".join(
-        f"{codebook.framing_label(framing)} {(one < 0).sum()}, {(one == 0).sum()} and {(one > 0).sum()}"
+        (
+            f"{codebook.framing_label(framing)} {(one < 0).sum()}, {(one == 0).sum()} and "
+            f"{(one > 0).sum()}"
+        )
         for framing, one in tallies.preferences(responses, pair).items()
     )
     sentences.append(
@@ -385,15 +498,19 @@ def _summary(
         else f"{a} and {b} were never compared."
     )
     sentences.append(
-        f"Over all answers the image on the left was preferred {_count(sides.left.sum(), 'time')}, the one on the right "
-        f"{_count(sides.right.sum(), 'time')}; no difference was seen {_count(sides.none.sum(), 'time')}."
+        "Over all answers the image on the left was preferred "
+        f"{_count(sides.left.sum(), 'time')}, the one on the right "
+        f"{_count(sides.right.sum(), 'time')}; no difference was seen "
+        f"{_count(sides.none.sum(), 'time')}."
     )
     return sentences
 
 
 def _first(values: Mapping[str, float], codebook: Codebook) -> list[str]:
     top = max(values.values())
-    return [codebook.label(name) for name, value in values.items() if np.isclose(value, top, rtol=1e-9)]
+    return [
+        codebook.label(name) for name, value in values.items() if np.isclose(value, top, rtol=1e-9)
+    ]
 
 
 def _coherence(found: Priorities) -> str:

@@ -1,6 +1,7 @@
 """Reads a table of answers, one row a trial, and makes it tidy. Nothing is dropped in silence.
 
-A row that cannot be used becomes a `Finding` with its line number and its reason; a fault of the whole file is an InputError.
+A row that cannot be used becomes a `Finding` with its line number and its reason; a fault of the
+whole file is an InputError.
 """
 
 from __future__ import annotations
@@ -16,17 +17,28 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from . import codebook as codebooks
-from .codebook import FRAMING, Codebook
-from .errors import InputError
-from .options import FEWEST_PEOPLE
+from analysis import codebook as codebooks
+from analysis.codebook import FRAMING, Codebook
+from analysis.errors import InputError
+from analysis.options import FEWEST_PEOPLE
 
-REQUIRED = ("participant", "familiarity", "framing", "left", "right", "answer", "order", "rt_ms", "started_at")
+REQUIRED = (
+    "participant",
+    "familiarity",
+    "framing",
+    "left",
+    "right",
+    "answer",
+    "order",
+    "rt_ms",
+    "started_at",
+)
 OPTIONAL = ("simulated", "study", "study_version")
 REPEATS = ("participant", "framing", "a", "b", "preference", "first_preference")
 #: Columns of an answer that no answers can be grouped by.
 NO_FACTOR = ("participant", "left", "right", "answer", "order", "rt_ms", "started_at")
-#: So many levels a factor may have; and a factor of numbers, beyond which it is a measurement and no group.
+#: So many levels a factor may have; and a factor of numbers, beyond which it is a measurement and
+#: no group.
 MOST_LEVELS, MOST_NUMBERS = 30, 10
 
 _INTEGER = r"[+-]?[0-9]{1,9}(?:\.0*)?"
@@ -35,7 +47,10 @@ _NUMBER = r"\+?[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,2})?"
 
 @dataclass(frozen=True)
 class Finding:
-    """A row that is not counted. `kind` is 'malformed' or 'duplicate'; `last_line` differs where a row spans several lines."""
+    """A row that is not counted.
+
+    `kind` is 'malformed' or 'duplicate'; `last_line` differs where a row spans several lines.
+    """
 
     line: int
     last_line: int
@@ -44,7 +59,11 @@ class Finding:
     row: str
 
     def __str__(self) -> str:
-        lines = f"line {self.line}" if self.line == self.last_line else f"lines {self.line} to {self.last_line}"
+        lines = (
+            f"line {self.line}"
+            if self.line == self.last_line
+            else f"lines {self.line} to {self.last_line}"
+        )
         return f"{lines}: {self.reason}"
 
 
@@ -55,7 +74,8 @@ class Responses:
     frame has one row an answer:
         participant     category
         familiarity     int8, 1 to 5
-        framing         ordered category, in the order of the codebook; with another factor than 'framing', its level
+        framing         ordered category, in the order of the codebook; with another factor than
+                        'framing', its level
         image_framing   ordered category: the framing of the images, whatever the factor
         a, b            ordered categories: the pair, a before b in the order of techniques
         preference      int8, -2 to 2, oriented to the pair: negative prefers a, positive prefers b
@@ -70,8 +90,10 @@ class Responses:
 
     grouping says, where the factor is not 'framing', what its levels hold; notes begin with it.
 
-    repeats has one row for each question that a participant was asked again (the same pair under another `order`; it is not counted):
-        participant, framing, a, b, preference (the later answer), first_preference (the one that counts)
+    repeats has one row for each question that a participant was asked again (the same pair under
+    another `order`; it is not counted):
+        participant, framing, a, b, preference (the later answer), first_preference (the one that
+        counts)
     """
 
     frame: pd.DataFrame
@@ -102,14 +124,21 @@ class Responses:
 
 
 def read_responses(
-    path: str | Path, codebook: Codebook | None = None, order: Iterable[str] | None = None, factor: str = FRAMING
+    path: str | Path,
+    codebook: Codebook | None = None,
+    order: Iterable[str] | None = None,
+    factor: str = FRAMING,
 ) -> Responses:
-    """Read responses.csv (UTF-8 with or without BOM, comma separated). See `Responses` for what comes out.
+    """Read responses.csv (UTF-8 with or without BOM, comma separated).
 
-    codebook: the study's (`codebook.read_manifest`); without it names, labels and order come from the table.
-    order: every technique once; overrides the order of the codebook.
-    factor: the column that answers are grouped by, everywhere that a framing is meant without it: every table keeps its columns, and
-        `framing` holds the factor's level. Which answers are duplicates depends on it: one pair at one framing counts once a level.
+    See `Responses` for what comes out.
+
+    codebook: the study's (`codebook.read_manifest`); without it names, labels and order come from
+    the table. order: every technique once; overrides the order of the codebook. factor: the column
+    that answers are grouped by, everywhere that a framing is meant without it: every table keeps
+    its columns, and
+        `framing` holds the factor's level. Which answers are duplicates depends on it: one pair at
+        one framing counts once a level.
     """
     _allowed(factor)
     path = Path(path)
@@ -118,7 +147,9 @@ def read_responses(
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     raw, lines, findings = _parse(str(path), data, factor)
-    return _tidy(str(path), raw, lines, findings, codebook, order, factor, hashlib.sha256(data).hexdigest())
+    return _tidy(
+        str(path), raw, lines, findings, codebook, order, factor, hashlib.sha256(data).hexdigest()
+    )
 
 
 def responses_from_records(
@@ -127,7 +158,9 @@ def responses_from_records(
     order: Iterable[str] | None = None,
     factor: str = FRAMING,
 ) -> Responses:
-    """The same from mappings with the columns of responses.csv, for answers that are not in a file; lines count from 1."""
+    """The same from mappings with the columns of responses.csv, for answers that are not in a file;
+    lines count from 1.
+    """
     _allowed(factor)
     raw = pd.DataFrame.from_records(list(records))
     missing = [name for name in REQUIRED if name not in raw]
@@ -137,7 +170,9 @@ def responses_from_records(
         raise InputError(_lacking(factor, raw))
     blank = raw[factor].isna() & (factor not in REQUIRED)
     raw = raw[[name for name in dict.fromkeys((*REQUIRED, *OPTIONAL, factor)) if name in raw]]
-    raw = raw.map(lambda value: str(int(value)) if isinstance(value, bool) else str(value)).astype(object)
+    raw = raw.map(lambda value: str(int(value)) if isinstance(value, bool) else str(value)).astype(
+        object
+    )
     raw["level"] = raw[factor].str.strip().mask(blank, "")
     raw["line"] = raw["last_line"] = np.arange(1, len(raw) + 1)
     lines = [",".join(values) for values in raw[list(REQUIRED)].to_numpy()]
@@ -146,21 +181,30 @@ def responses_from_records(
 
 def _allowed(factor: str) -> None:
     if factor in NO_FACTOR:
-        raise InputError(f"the factor is {factor!r}, which no answers can be grouped by; expected a column like framing or familiarity")
+        raise InputError(
+            f"the factor is {factor!r}, which no answers can be grouped by; expected a column "
+            "like framing or familiarity"
+        )
 
 
 def _lacking(factor: str, columns: Iterable[str]) -> str:
-    return f"has no column {factor!r} to group answers by; expected one of {', '.join(name for name in columns if name not in NO_FACTOR)}"
+    return (
+        f"has no column {factor!r} to group answers by; expected one of "
+        f"{', '.join(name for name in columns if name not in NO_FACTOR)}"
+    )
 
 
 def _parse(name: str, data: bytes, factor: str) -> tuple[pd.DataFrame, list[str], list[Finding]]:
-    """The cells as text, with line and last_line; the lines of the file; findings for rows without the header's fields."""
+    """The cells as text, with line and last_line; the lines of the file; findings for rows without
+    the header's fields.
+    """
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(
-            f"{name}: line {line}: byte 0x{data[error.start]:02x} is not UTF-8; save the table as 'CSV UTF-8'"
+            f"{name}: line {line}: byte 0x{data[error.start]:02x} is not UTF-8; save the "
+            "table as 'CSV UTF-8'"
         ) from None
     if not text.strip():
         raise InputError(f"{name}: is empty, expected a header and one row an answer")
@@ -173,10 +217,14 @@ def _parse(name: str, data: bytes, factor: str) -> tuple[pd.DataFrame, list[str]
     missing = [column for column in REQUIRED if column not in header]
     if missing:
         hint = next((f"; is it separated by {mark!r}?" for mark in ";\t" if mark in lines[0]), "")
-        raise InputError(f"{name}: has no column {', '.join(missing)}{hint}; expected {','.join(REQUIRED)}")
+        raise InputError(
+            f"{name}: has no column {', '.join(missing)}{hint}; expected {','.join(REQUIRED)}"
+        )
     if factor not in header:
         raise InputError(f"{name}: {_lacking(factor, header)}")
-    wanted = [column for column in dict.fromkeys((*REQUIRED, *OPTIONAL, factor)) if column in header]
+    wanted = [
+        column for column in dict.fromkeys((*REQUIRED, *OPTIONAL, factor)) if column in header
+    ]
     twice = [column for column in wanted if header.count(column) > 1]
     if twice:
         raise InputError(f"{name}: has the column {', '.join(twice)} twice")
@@ -195,7 +243,9 @@ def _parse(name: str, data: bytes, factor: str) -> tuple[pd.DataFrame, list[str]
         except csv.Error as error:
             row, fault = None, f"is no CSV: {error}"
             if reader.line_num >= len(lines) and "unexpected end" in str(error):
-                raise InputError(f"{name}: line {first}: a quotation mark is opened and never closed") from None
+                raise InputError(
+                    f"{name}: line {first}: a quotation mark is opened and never closed"
+                ) from None
         if row == []:
             continue
         if row is not None and len(row) == len(header):
@@ -212,7 +262,9 @@ def _parse(name: str, data: bytes, factor: str) -> tuple[pd.DataFrame, list[str]
 
 
 def _finding(first: int, last: int, kind: str, reason: str, lines: list[str]) -> Finding:
-    return Finding(int(first), int(last), kind, reason, "".join(lines[first - 1 : last]).rstrip("\r\n"))
+    return Finding(
+        int(first), int(last), kind, reason, "".join(lines[first - 1 : last]).rstrip("\r\n")
+    )
 
 
 def _tidy(
@@ -229,9 +281,14 @@ def _tidy(
     values, reasons = _checked(raw, codebook, factor)
     simulated = _one_kind(name, raw)
     findings = findings + [
-        _finding(raw.line[at], raw.last_line[at], "malformed", _some(reasons[at], 3, "; "), lines) for at in sorted(reasons)
+        _finding(raw.line[at], raw.last_line[at], "malformed", _some(reasons[at], 3, "; "), lines)
+        for at in sorted(reasons)
     ]
-    frame = raw[["participant", "framing", "left", "right", "line", "last_line"]].join(values).drop(index=list(reasons))
+    frame = (
+        raw[["participant", "framing", "left", "right", "line", "last_line"]]
+        .join(values)
+        .drop(index=list(reasons))
+    )
     if frame.empty:
         first = min(findings, key=lambda finding: finding.line)
         raise InputError(f"{name}: none of its {rows} rows can be used; {first}")
@@ -240,13 +297,19 @@ def _tidy(
         codebook = codebooks.from_table(frame.framing, frame[["left", "right"]].to_numpy().ravel())
     if order is not None:
         present = set(frame.left) | set(frame.right)
-        codebook = codebook.ordered(order, [name for name in codebook.techniques if name in present])
+        codebook = codebook.ordered(
+            order, [name for name in codebook.techniques if name in present]
+        )
 
     frame = _oriented(frame, codebook)
     if factor != FRAMING:
         level = raw.level.drop(index=list(reasons))
         if factor == "familiarity":
-            level = frame.groupby("participant", observed=True).familiarity.transform("first").astype(str)
+            level = (
+                frame.groupby("participant", observed=True)
+                .familiarity.transform("first")
+                .astype(str)
+            )
         codebook = codebook.by(factor, *_levels(name, factor, level))
         frame["framing"] = pd.Categorical(level, codebook.framings, ordered=True)
     key = ["participant", "framing", "image_framing", "a", "b"]
@@ -254,15 +317,22 @@ def _tidy(
     asked_again = {}
     if again.any():
         firsts = frame.drop_duplicates(key)[[*key, "line", "order", "preference"]]
-        firsts = firsts.rename(columns={"line": "first", "order": "first_order", "preference": "first_preference"})
+        firsts = firsts.rename(
+            columns={"line": "first", "order": "first_order", "preference": "first_preference"}
+        )
         repeats = frame[again].merge(firsts, on=key)
-        asked_again = {"repeats": repeats.loc[repeats.order != repeats.first_order, list(REPEATS)].reset_index(drop=True)}
+        asked_again = {
+            "repeats": repeats.loc[repeats.order != repeats.first_order, list(REPEATS)].reset_index(
+                drop=True
+            )
+        }
         findings += [
             _finding(
                 row.line,
                 row.last_line,
                 "duplicate",
-                f"{row.participant!r} answered {_where(row, codebook)}, {row.a} against {row.b}, on line {row.first} already, "
+                f"{row.participant!r} answered {_where(row, codebook)}, {row.a} against "
+                f"{row.b}, on line {row.first} already, "
                 "which is the one that counts",
                 lines,
             )
@@ -286,70 +356,122 @@ def _tidy(
 
 
 def questions(frame: pd.DataFrame, codebook: Codebook) -> list[str]:
-    """The columns that tell one question from another: the factor's level is one where somebody answered the same images at several."""
+    """The columns that tell one question from another: the factor's level is one where somebody
+    answered the same images at several.
+    """
     key = ["image_framing", "a", "b"]
     within = codebook.factor != FRAMING and frame.duplicated(["participant", *key]).any()
     return ["framing", *key] if within else key
 
 
 def _levels(name: str, factor: str, level: pd.Series) -> tuple[list[str], str]:
-    """The levels of a factor in order, and the rule of the order; refuses a column that is no factor."""
+    """The levels of a factor in order, and the rule of the order; refuses a column that is no
+    factor.
+    """
     levels = list(pd.unique(level))
     numbers = pd.to_numeric(pd.Series(levels), errors="coerce")
     numeric = bool(np.isfinite(numbers).all())
     most = MOST_NUMBERS if numeric else MOST_LEVELS
     if len(levels) > most:
-        got = f"{len(levels)} numbers from {numbers.min():g} to {numbers.max():g}" if numeric else f"{len(levels)} levels"
+        got = (
+            f"{len(levels)} numbers from {numbers.min():g} to {numbers.max():g}"
+            if numeric
+            else f"{len(levels)} levels"
+        )
         raise InputError(
-            f"{name}: the factor {factor!r} has {got}, expected at most {most}; put them into a few groups in a column of their own"
+            f"{name}: the factor {factor!r} has {got}, expected at most {most}; put them into "
+            "a few groups in a column of their own"
         )
     if not numeric:
         return levels, "first appearance in the table"
-    return [levels[place] for place in np.argsort(numbers.to_numpy(), kind="stable")], "from the lowest number to the highest"
+    return [
+        levels[place] for place in np.argsort(numbers.to_numpy(), kind="stable")
+    ], "from the lowest number to the highest"
 
 
 def _where(row: object, codebook: Codebook) -> str:
-    return row.framing if codebook.factor == FRAMING else f"{codebook.framing_label(row.framing)}, {row.image_framing}"
+    return (
+        row.framing
+        if codebook.factor == FRAMING
+        else f"{codebook.framing_label(row.framing)}, {row.image_framing}"
+    )
 
 
 def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
     """What the levels of a factor hold, and how what they hold is taken."""
-    held = frame.groupby("framing", observed=True).agg(people=("participant", "nunique"), answers=("answer", "size"))
+    held = frame.groupby("framing", observed=True).agg(
+        people=("participant", "nunique"), answers=("answer", "size")
+    )
     sizes = "; ".join(
-        f"{codebook.framing_label(row.Index)}: {_plural(row.people, 'participant')}, {_plural(row.answers, 'answer')}"
+        (
+            f"{codebook.framing_label(row.Index)}: {_plural(row.people, 'participant')}, "
+            f"{_plural(row.answers, 'answer')}"
+        )
         for row in held.itertuples()
     )
-    yield f"Answers are grouped by {codebook.spoken} ({sizes}); the column framing of every table holds its levels."
+    yield (
+        f"Answers are grouped by {codebook.spoken} ({sizes}); the column framing of every "
+        "table holds its levels."
+    )
     if len(held) == 1:
         yield f"There is one {codebook.level}: nothing is compared over it."
     few = [codebook.framing_label(level) for level in held.index[held.people < FEWEST_PEOPLE]]
     if few:
-        yield f"{_some(few)}: fewer than {FEWEST_PEOPLE} participants, which resampled intervals and tests on participants need."
-    here = frame.drop_duplicates(["framing", "image_framing"]).groupby("framing", observed=True).image_framing
+        yield (
+            f"{_some(few)}: fewer than {FEWEST_PEOPLE} participants, which resampled "
+            "intervals and tests on participants need."
+        )
+    here = (
+        frame.drop_duplicates(["framing", "image_framing"])
+        .groupby("framing", observed=True)
+        .image_framing
+    )
     several = here.nunique()
     if (several > 1).any():
         where = [codebook.framing_label(level) for level in several.index[several > 1]]
-        names = [name for name in frame.image_framing.cat.categories if (frame.image_framing == name).any()]
+        names = [
+            name
+            for name in frame.image_framing.cat.categories
+            if (frame.image_framing == name).any()
+        ]
         yield (
-            f"{'Every ' + codebook.level if len(where) == len(held) else _some(where)} pools framings ({_some(names)}). Answers of one "
-            "participant about one pair at several framings are repeated measures: tests take the participant's mean, and intervals "
-            "resample participants with all of their answers; counts, medians, worths and AHP take every answer."
+            f"{'Every ' + codebook.level if len(where) == len(held) else _some(where)} pools "
+            f"framings ({_some(names)}). Answers of one "
+            "participant about one pair at several framings are repeated measures: tests "
+            "take the participant's mean, and intervals "
+            "resample participants with all of their answers; counts, medians, worths and "
+            "AHP take every answer."
         )
     if len(held) > 1 and "framing" not in questions(frame, codebook):
         yield (
-            f"Nobody judged the same images at several {codebook.levels}: taken together, the answers are those of the study without "
+            f"Nobody judged the same images at several {codebook.levels}: taken together, the "
+            "answers are those of the study without "
             "this grouping."
         )
 
 
-def _checked(raw: pd.DataFrame, codebook: Codebook | None, factor: str) -> tuple[pd.DataFrame, dict[int, list[str]]]:
+def _checked(
+    raw: pd.DataFrame, codebook: Codebook | None, factor: str
+) -> tuple[pd.DataFrame, dict[int, list[str]]]:
     """The numeric columns as numbers, and for each row that fails, by its position, why."""
     values = pd.DataFrame(index=raw.index)
-    for column, pattern in (("familiarity", _INTEGER), ("answer", _INTEGER), ("order", _INTEGER), ("rt_ms", _NUMBER)):
-        values[column] = pd.to_numeric(raw[column].where(raw[column].str.fullmatch(pattern)), errors="coerce")
-    values["started_at"] = pd.to_datetime(raw.started_at, format="ISO8601", utc=True, errors="coerce")
+    for column, pattern in (
+        ("familiarity", _INTEGER),
+        ("answer", _INTEGER),
+        ("order", _INTEGER),
+        ("rt_ms", _NUMBER),
+    ):
+        values[column] = pd.to_numeric(
+            raw[column].where(raw[column].str.fullmatch(pattern)), errors="coerce"
+        )
+    values["started_at"] = pd.to_datetime(
+        raw.started_at, format="ISO8601", utc=True, errors="coerce"
+    )
 
-    checks = [(column, raw[column] == "", "a name") for column in ("participant", "framing", "left", "right")]
+    checks = [
+        (column, raw[column] == "", "a name")
+        for column in ("participant", "framing", "left", "right")
+    ]
     checks += [
         ("familiarity", ~values.familiarity.between(1, 5), "an integer from 1 to 5"),
         ("answer", ~values.answer.between(-2, 2), "an integer from -2 to 2"),
@@ -373,9 +495,14 @@ def _checked(raw: pd.DataFrame, codebook: Codebook | None, factor: str) -> tuple
     reasons: dict[int, list[str]] = {}
     for column, bad, expected in checks:
         for at in np.flatnonzero(bad):
-            reasons.setdefault(at, []).append(f"{factor if column == 'level' else column} is {raw[column][at]!r:.60}, expected {expected}")
+            reasons.setdefault(at, []).append(
+                f"{factor if column == 'level' else column} is {raw[column][at]!r:.60}, "
+                f"expected {expected}"
+            )
     for at in np.flatnonzero((raw.left == raw.right) & (raw.left != "")):
-        reasons.setdefault(at, []).append(f"left and right are both {raw.left[at]!r:.60}, expected two techniques")
+        reasons.setdefault(at, []).append(
+            f"left and right are both {raw.left[at]!r:.60}, expected two techniques"
+        )
     return values, reasons
 
 
@@ -383,10 +510,15 @@ def _one_kind(name: str, raw: pd.DataFrame) -> bool:
     """Whether the answers are simulated; refuses a table that mixes them with real ones."""
     if "simulated" not in raw:
         return False
-    first = {flag: raw.line[raw.simulated == flag].min() for flag in ("0", "1") if (raw.simulated == flag).any()}
+    first = {
+        flag: raw.line[raw.simulated == flag].min()
+        for flag in ("0", "1")
+        if (raw.simulated == flag).any()
+    }
     if len(first) == 2:
         raise InputError(
-            f"{name}: mixes real answers (first on line {first['0']}) and simulated ones (first on line {first['1']}); "
+            f"{name}: mixes real answers (first on line {first['0']}) and simulated ones "
+            f"(first on line {first['1']}); "
             "expected one kind"
         )
     return "1" in first
@@ -395,7 +527,9 @@ def _one_kind(name: str, raw: pd.DataFrame) -> bool:
 def _oriented(frame: pd.DataFrame, codebook: Codebook) -> pd.DataFrame:
     """Adds pair, preference, strength and winner; see `Responses`."""
     techniques = pd.CategoricalDtype(codebook.techniques, ordered=True)
-    left, right = (pd.Categorical(frame[side], dtype=techniques).codes for side in ("left", "right"))
+    left, right = (
+        pd.Categorical(frame[side], dtype=techniques).codes for side in ("left", "right")
+    )
     a_left = left < right
     preference = np.where(a_left, frame.answer, -frame.answer).astype(np.int8)
     a, b = np.minimum(left, right), np.maximum(left, right)
@@ -428,21 +562,34 @@ def _notes(frame: pd.DataFrame, raw: pd.DataFrame, codebook: Codebook) -> Iterab
     levels = frame.groupby("participant", observed=True).familiarity.nunique()
     unsure = list(levels.index[levels > 1])
     if unsure:
-        yield f"{_some(unsure)} rated their familiarity in more than one way; the first rating is used."
+        yield (
+            f"{_some(unsure)} rated their familiarity in more than one way; the first "
+            "rating is used."
+        )
     asked = len(frame[questions(frame, codebook)].drop_duplicates())
     answers = frame.participant.value_counts()
     short = sorted(answers.index[answers < asked])
     if short:
-        yield f"{_some(short)} answered fewer than the {asked} questions in the table; what they answered is counted."
+        yield (
+            f"{_some(short)} answered fewer than the {asked} questions in the table; what "
+            "they answered is counted."
+        )
     for column in ("study", "study_version"):
         if column in raw:
             several = sorted(raw[column].unique())
             if len(several) > 1:
-                yield f"The table pools answers with {len(several)} values of {column}: {_some(several)}."
+                yield (
+                    f"The table pools answers with {len(several)} values of {column}: "
+                    f"{_some(several)}."
+                )
     present = set(frame.a) | set(frame.b)
     for framing in codebook.framings:
         here = frame[frame.framing == framing]
-        absent = [name for name in codebook.techniques if name in present and name not in set(here.a) | set(here.b)]
+        absent = [
+            name
+            for name in codebook.techniques
+            if name in present and name not in set(here.a) | set(here.b)
+        ]
         if here.empty:
             yield f"No answers at {framing}."
         elif absent:

@@ -1,6 +1,7 @@
 """The tables that are read: the same rows and words on the page, in the PDF and in LaTeX.
 
-Numbers are formatted here, once; what does not exist is an en dash. `tables/*.csv` hold every digit.
+Numbers are formatted here, once; what does not exist is an en dash. `tables/*.csv` hold every
+digit.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from .codebook import Codebook
-from .options import Options
-from .worth_figures import DRAWN, MODELS, VERDICTS, framing_label, verdict
+from analysis.codebook import Codebook
+from analysis.options import Options
+from analysis.worth_figures import DRAWN, MODELS, VERDICTS, framing_label, verdict
 
 #: Statistics of agreement.csv that are read, with their names.
 STATISTICS = DRAWN | {
@@ -33,7 +34,10 @@ MINUS = "\N{MINUS SIGN}"
 
 @dataclass(frozen=True)
 class Shown:
-    """A table to read. columns: headings; numeric: which of them are numbers, set to the right; rows: cells as text."""
+    """A table to read.
+
+    columns: headings; numeric: which of them are numbers, set to the right; rows: cells as text.
+    """
 
     name: str
     caption: str
@@ -85,10 +89,17 @@ def worths(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
     return Shown(
         "worths",
         f"Worths, centred on 0 within a {codebook.level}, with {100 * options.level:g} % intervals",
-        (codebook.heading, "Technique", *(f"{MODELS[model][0]} ({MODELS[model][1]})" for model in models)),
+        (
+            codebook.heading,
+            "Technique",
+            *(f"{MODELS[model][0]} ({MODELS[model][1]})" for model in models),
+        ),
         (False, False, *[True] * len(models)),
         tuple(rows),
-        "Intervals by resampling participants, those of the ordinal model by Wald from its information.",
+        (
+            "Intervals by resampling participants, those of the ordinal model by Wald from its "
+            "information."
+        ),
     )
 
 
@@ -100,7 +111,10 @@ def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
             codebook.label(row.a),
             codebook.label(row.b),
             f"{row.n:g}",
-            " / ".join(f"{count:g}" for count in (row.strong_a, row.slight_a, row.none, row.slight_b, row.strong_b)),
+            " / ".join(
+                f"{count:g}"
+                for count in (row.strong_a, row.slight_a, row.none, row.slight_b, row.strong_b)
+            ),
             interval(row.mean_preference, row.low, row.high),
             probability(row.wilcoxon_p),
             probability(row.sign_p),
@@ -117,15 +131,29 @@ def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
         "pairs",
         "Every pair: answers, tests and what they come to",
         (
-            codebook.heading, "A", "B", "n", "Answers", "Mean preference for B", "Wilcoxon p", "Sign p", "Holm p", "TOST p",
-            "TOST Holm p", "Rank-biserial", "JOD, B less A", "Verdict",
+            codebook.heading,
+            "A",
+            "B",
+            "n",
+            "Answers",
+            "Mean preference for B",
+            "Wilcoxon p",
+            "Sign p",
+            "Holm p",
+            "TOST p",
+            "TOST Holm p",
+            "Rank-biserial",
+            "JOD, B less A",
+            "Verdict",
         ),
         (False, False, False, *[True] * 10, False),
         tuple(rows),
-        "Answers: strong for A / slight for A / no difference / slight for B / strong for B. Positive numbers favour B. "
-        f"Holm's correction is of the {_test(options)} and of the two one-sided tests (TOST), over the pairs of {_family(options, codebook)}; "
+        "Answers: strong for A / slight for A / no difference / slight for B / strong for B. "
+        "Positive numbers favour B. "
+        f"Holm's correction is of the {_test(options)} and of the two one-sided tests (TOST), "
+        f"over the pairs of {_family(options, codebook)}; "
         f"the verdict is at {alpha:g}.",
-    )  # fmt: skip
+    )
 
 
 def agreement(table: pd.DataFrame, codebook: Codebook) -> Shown:
@@ -160,11 +188,20 @@ def priorities(table: pd.DataFrame, codebook: Codebook) -> Shown:
             for kind in kinds
         ]
         rows.append((framing_label(codebook, framing), codebook.label(technique), *values))
-    names = {"median": "median", "geometric_mean": "geometric mean", "eigenvector": "eigenvector", "row_geometric_mean": "row mean"}
+    names = {
+        "median": "median",
+        "geometric_mean": "geometric mean",
+        "eigenvector": "eigenvector",
+        "row_geometric_mean": "row mean",
+    }
     return Shown(
         "ahp_intervals",
         "AHP priorities by how people are put together and how priorities are found",
-        (codebook.heading, "Technique", *(f"{names.get(one, one)}, {names.get(other, other)}" for one, other in kinds)),
+        (
+            codebook.heading,
+            "Technique",
+            *(f"{names.get(one, one)}, {names.get(other, other)}" for one, other in kinds),
+        ),
         (False, False, *[True] * len(kinds)),
         tuple(rows),
         "Row mean: geometric mean of the rows. Intervals by resampling participants.",
@@ -179,7 +216,9 @@ def consistency(table: pd.DataFrame, codebook: Codebook) -> Shown:
             names.get(row.aggregation, row.aggregation),
             interval(row.ci, row.ci_low, row.ci_high, 3),
             interval(row.cr, row.cr_low, row.cr_high, 3),
-            f"{codebook.label(row.a)} over {codebook.label(row.b)}" if isinstance(row.a, str) and row.a else NOTHING,
+            f"{codebook.label(row.a)} over {codebook.label(row.b)}"
+            if isinstance(row.a, str) and row.a
+            else NOTHING,
             number(row.judgement),
             number(row.consistent),
         )
@@ -188,7 +227,15 @@ def consistency(table: pd.DataFrame, codebook: Codebook) -> Shown:
     return Shown(
         "ahp_consistency",
         "Consistency of the AHP matrices, and the judgement to look at again",
-        (codebook.heading, "People by", "CI", "CR", "Look again at", "Judgement", "The others imply"),
+        (
+            codebook.heading,
+            "People by",
+            "CI",
+            "CR",
+            "Look again at",
+            "Judgement",
+            "The others imply",
+        ),
         (False, False, True, True, False, True, True),
         tuple(rows),
     )
@@ -201,11 +248,21 @@ def trend(table: pd.DataFrame) -> Shown:
         "page_l": "Page's L",
     }
     rows = [
-        (names.get(row.statistic, row.statistic), interval(row.value, row.low, row.high, 3), probability(row.p))
+        (
+            names.get(row.statistic, row.statistic),
+            interval(row.value, row.low, row.high, 3),
+            probability(row.p),
+        )
         for row in table.itertuples()
         if np.isfinite(row.value)
     ]
-    return Shown("trend", "Preference against distance", ("Statistic", "Value", "p"), (False, True, True), tuple(rows))
+    return Shown(
+        "trend",
+        "Preference against distance",
+        ("Statistic", "Value", "p"),
+        (False, True, True),
+        tuple(rows),
+    )
 
 
 def familiarity(table: pd.DataFrame, codebook: Codebook) -> Shown:
@@ -225,10 +282,20 @@ def familiarity(table: pd.DataFrame, codebook: Codebook) -> Shown:
     return Shown(
         "familiarity_interaction",
         "Does familiarity change preference?",
-        (codebook.heading, "Technique", "n", "Slope a level", "Spearman", "p", "Holm p", "Found with power 0.8 from"),
+        (
+            codebook.heading,
+            "Technique",
+            "n",
+            "Slope a level",
+            "Spearman",
+            "p",
+            "Holm p",
+            "Found with power 0.8 from",
+        ),
         (False, False, *[True] * 6),
         tuple(rows),
-        "Slope: change of a technique's mean preference for each level of familiarity. The last column is the smallest correlation "
+        "Slope: change of a technique's mean preference for each level of familiarity. The "
+        "last column is the smallest correlation "
         "that so many people find with a power of 0.8: smaller ones would mostly be missed.",
     )
 
@@ -237,7 +304,11 @@ def sensitivity(table: pd.DataFrame, codebook: Codebook) -> Shown:
     rows = [
         (
             framing_label(codebook, row.framing),
-            {"preferred": "preferred", "equivalent": "as good as each other", "first": "highest worth"}.get(row.conclusion, row.conclusion),
+            {
+                "preferred": "preferred",
+                "equivalent": "as good as each other",
+                "first": "highest worth",
+            }.get(row.conclusion, row.conclusion),
             _pair(row, codebook),
             _said(row.everyone, codebook),
             _said(row.without_excluded, codebook),
@@ -259,7 +330,9 @@ def alpha_of(options: Options) -> float:
     return round(1 - options.level, 10)
 
 
-def all_shown(tables: Mapping[str, pd.DataFrame], codebook: Codebook, options: Options) -> dict[str, Shown]:
+def all_shown(
+    tables: Mapping[str, pd.DataFrame], codebook: Codebook, options: Options
+) -> dict[str, Shown]:
     """Every table of `compute.everything` that is read, by name, without empty ones."""
     found: Sequence[Shown] = (
         worths(tables["worths"], codebook, options),
@@ -282,7 +355,9 @@ def _pair(row: object, codebook: Codebook) -> str:
 def _said(value: object, codebook: Codebook) -> str:
     if isinstance(value, str):
         return codebook.label(value) if value in codebook.techniques else value
-    return NOTHING if value is None or (isinstance(value, float) and np.isnan(value)) else str(value)
+    return (
+        NOTHING if value is None or (isinstance(value, float) and np.isnan(value)) else str(value)
+    )
 
 
 def _test(options: Options) -> str:
@@ -290,4 +365,6 @@ def _test(options: Options) -> str:
 
 
 def _family(options: Options, codebook: Codebook) -> str:
-    return {"study": f"all {codebook.levels} together", "framing": f"each {codebook.level}"}[options.family]
+    return {"study": f"all {codebook.levels} together", "framing": f"each {codebook.level}"}[
+        options.family
+    ]

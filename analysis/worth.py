@@ -1,20 +1,28 @@
-"""How much each technique is worth: four models of paired comparisons, centred on 0 within a framing, with intervals.
+"""How much each technique is worth: four models of paired comparisons, centred on 0 within a
+framing, with intervals.
 
-bradley_terry   P(i over j) = logistic(w_i - w_j).  Bradley and Terry 1952, Biometrika 39, doi:10.2307/2334029. 'No difference' is
-                half a win for each, or dropped (`Options.ties`).
-davidson        P(i) : P(j) : P(no difference) = pi_i : pi_j : nu sqrt(pi_i pi_j), w = log pi.  Davidson 1970, JASA 65(329),
-                doi:10.1080/01621459.1970.10481082: 'no difference' is an outcome of its own.
-thurstone_jod   P(i over j) = Phi((w_i - w_j) / JOD_SIGMA), case V, in just-objectionable differences: 1 JOD is preferred by 75 %.
-                Thurstone 1927; Perez-Ortiz and Mantiuk 2017, arXiv:1712.03686. 'No difference' as in bradley_terry.
-ordinal         all five answers, with a side effect and participants: P(answer <= k) = logistic(tau_k - eta),
-                eta = (w_b + v_b) - (w_a + v_a) +- (side + s): tau symmetric about 0; v ~ N(0, sd_preference^2) a participant's own
-                taste for each technique, centred; s ~ N(0, sd_side^2) their own leaning to the right. Agresti 1992, Applied Statistics 41,
-                doi:10.2307/2347562; the integral over v and s by Laplace's approximation, its gradient exact, or, with three techniques
-                and few answers a person, by adaptive Gauss-Hermite quadrature; intervals by Wald from the observed information. Worths
-                are logits for one participant. Under Laplace spreads come out some 10 % small with 10 answers a person; worths 1 to 2 %.
+bradley_terry   P(i over j) = logistic(w_i - w_j).  Bradley and Terry 1952, Biometrika 39,
+                doi:10.2307/2334029. 'No difference' is half a win for each, or dropped
+                (`Options.ties`).
+davidson        P(i) : P(j) : P(no difference) = pi_i : pi_j : nu sqrt(pi_i pi_j), w = log pi.
+                Davidson 1970, JASA 65(329), doi:10.1080/01621459.1970.10481082: 'no difference' is
+                an outcome of its own.
+thurstone_jod   P(i over j) = Phi((w_i - w_j) / JOD_SIGMA), case V, in just-objectionable
+                differences: 1 JOD is preferred by 75 %. Thurstone 1927; Perez-Ortiz and Mantiuk
+                2017, arXiv:1712.03686. 'No difference' as in bradley_terry.
+ordinal         all five answers, with a side effect and participants: P(answer <= k) =
+                logistic(tau_k - eta), eta = (w_b + v_b) - (w_a + v_a) +- (side + s): tau symmetric
+                about 0; v ~ N(0, sd_preference^2) a participant's own taste for each technique,
+                centred; s ~ N(0, sd_side^2) their own leaning to the right. Agresti 1992, Applied
+                Statistics 41, doi:10.2307/2347562; the integral over v and s by Laplace's
+                approximation, its gradient exact, or, with three techniques and few answers a
+                person, by adaptive Gauss-Hermite quadrature; intervals by Wald from the observed
+                information. Worths are logits for one participant. Under Laplace spreads come out
+                some 10 % small with 10 answers a person; worths 1 to 2 %.
 
-A fit that does not exist is NaN, and `missing_fit` names why: an item or a group that was never beaten or never preferred, groups that
-were never compared, all answers 'no difference'. Nothing is smoothed, penalised or added to make one.
+A fit that does not exist is NaN, and `missing_fit` names why: an item or a group that was never
+beaten or never preferred, groups that were never compared, all answers 'no difference'. Nothing is
+smoothed, penalised or added to make one.
 """
 
 from __future__ import annotations
@@ -27,32 +35,47 @@ import pandas as pd
 from scipy import optimize, special, stats
 from scipy.sparse import csgraph
 
-from . import bootstrap
-from .options import FEWEST_PEOPLE, Options
-from .panel import Panel, noted, panels, tied, wins
-from .responses import Responses
+from analysis import bootstrap
+from analysis.options import FEWEST_PEOPLE, Options
+from analysis.panel import Panel, noted, panels, tied, wins
+from analysis.responses import Responses
 
 #: Standard deviation of a difference in JOD: Phi(1 / JOD_SIGMA) = 0.75.
 JOD_SIGMA = 1 / stats.norm.ppf(0.75)
-#: Newton's method stops at steps below the first, and gives up after so many or where a worth passes the last (logits, probits);
-#: a slope at the last is still far above rounding, so that no flight to infinity is taken for an end.
+#: Newton's method stops at steps below the first, and gives up after so many or where a worth
+#: passes the last (logits, probits);
+#: a slope at the last is still far above rounding, so that no flight to infinity is taken for an
+#: end.
 STEP, ITERATIONS, FARTHEST = 1e-9, 60, 20.0
-#: Added to the diagonal of an information, as a share of its mean, so that one that runs flat can be solved.
+#: Added to the diagonal of an information, as a share of its mean, so that one that runs flat can
+#: be solved.
 RIDGE = 1e-11
 
-#: The ordinal model has no random effects where nobody gave more answers than the first, and a note of bias up to the second.
+#: The ordinal model has no random effects where nobody gave more answers than the first, and a note
+#: of bias up to the second.
 NO_TASTE, FEW_ANSWERS = 2, 6
-#: To so many techniques few answers are integrated by quadrature, with so many points along each of as many dimensions.
+#: To so many techniques few answers are integrated by quadrature, with so many points along each of
+#: as many dimensions.
 QUADRATURE_ITEMS, POINTS = 3, 5
 
 
 def worths(responses: Responses, options: Options) -> pd.DataFrame:
-    """framing, model, technique, estimate, low, high; empty numbers where a fit does not exist, named in attrs['notes']."""
+    """framing, model, technique, estimate, low, high; empty numbers where a fit does not exist,
+    named in attrs['notes'].
+    """
     rows, notes = [], bootstrap.few(responses)
     for name, panel in panels(responses).items():
         for model in options.models:
             estimate, low, high, said = _worth(panel, model, options)
-            rows += zip([name] * len(estimate), [model] * len(estimate), panel.items, estimate, low, high, strict=True)
+            rows += zip(
+                [name] * len(estimate),
+                [model] * len(estimate),
+                panel.items,
+                estimate,
+                low,
+                high,
+                strict=True,
+            )
             notes += [f"{name}, {model}: {line}" for line in said]
     return noted(rows, ["framing", "model", "technique", "estimate", "low", "high"], notes)
 
@@ -60,19 +83,27 @@ def worths(responses: Responses, options: Options) -> pd.DataFrame:
 def parameters(responses: Responses, options: Options) -> pd.DataFrame:
     """framing, model, parameter, estimate, low, high: what the models have beside worths.
 
-    davidson: log_nu. ordinal: side (logits, positive favours the right image), threshold_slight and threshold_strong (logits),
-    sd_preference and sd_side (logits, without interval), answers, log_likelihood (Laplace).
+    davidson: log_nu. ordinal: side (logits, positive favours the right image), threshold_slight and
+    threshold_strong (logits), sd_preference and sd_side (logits, without interval), answers,
+    log_likelihood (Laplace).
     """
     rows, notes = [], []
     for name, panel in panels(responses).items():
         if "davidson" in options.models and not missing_fit(panel, "davidson"):
             _, log_nu = davidson(wins(panel, panel.counts, "drop"), tied(panel, panel.counts))
             drawn = bootstrap.counts(panel, options)
-            low, high = bootstrap.interval(davidson(wins(panel, drawn, "drop"), tied(panel, drawn))[1], panel.people, options.level)
+            low, high = bootstrap.interval(
+                davidson(wins(panel, drawn, "drop"), tied(panel, drawn))[1],
+                panel.people,
+                options.level,
+            )
             if np.isfinite(log_nu):
                 rows.append((name, "davidson", "log_nu", float(log_nu), float(low), float(high)))
             else:
-                notes.append(f"{name}, davidson: no answer is 'no difference', nu is 0 and log_nu has no number")
+                notes.append(
+                    f"{name}, davidson: no answer is 'no difference', nu is 0 and log_nu has "
+                    "no number"
+                )
         if "ordinal" in options.models and not missing_fit(panel, "ordinal"):
             fit = fitted(panel)
             if fit is None:
@@ -87,7 +118,9 @@ def parameters(responses: Responses, options: Options) -> pd.DataFrame:
 
 
 def bootstrapped(panel: Panel, model: str, options: Options) -> np.ndarray:
-    """(resamples, n): the worths of bradley_terry, davidson or thurstone_jod in each resample, NaN where there is no fit."""
+    """(resamples, n): the worths of bradley_terry, davidson or thurstone_jod in each resample, NaN
+    where there is no fit.
+    """
     return _fitted(panel, model, bootstrap.counts(panel, options), options.ties)
 
 
@@ -101,10 +134,14 @@ def estimated(panel: Panel, model: str, options: Options) -> np.ndarray:
 def _fitted(panel: Panel, model: str, counts: np.ndarray, ties: str) -> np.ndarray:
     if model == "davidson":
         return davidson(wins(panel, counts, "drop"), tied(panel, counts))[0]
-    return {"bradley_terry": bradley_terry, "thurstone_jod": thurstone_jod}[model](wins(panel, counts, ties))
+    return {"bradley_terry": bradley_terry, "thurstone_jod": thurstone_jod}[model](
+        wins(panel, counts, ties)
+    )
 
 
-def _worth(panel: Panel, model: str, options: Options) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+def _worth(
+    panel: Panel, model: str, options: Options
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
     empty = np.full(len(panel.items), np.nan)
     reason = missing_fit(panel, model)
     if reason:
@@ -112,10 +149,16 @@ def _worth(panel: Panel, model: str, options: Options) -> tuple[np.ndarray, np.n
     if model == "ordinal":
         fit = fitted(panel)
         if fit is None:
-            return empty, empty, empty, [
-            "no finite worths: no maximum of the likelihood was found; with few answers a participant tastes, thresholds and worths "
-            "can grow together without end"
-        ]
+            return (
+                empty,
+                empty,
+                empty,
+                [
+                    "no finite worths: no maximum of the likelihood was found; with few "
+                    "answers a participant tastes, thresholds and worths "
+                    "can grow together without end"
+                ],
+            )
         half = stats.norm.ppf((1 + options.level) / 2) * fit.errors
         return fit.worth, fit.worth - half, fit.worth + half, _caveats(panel, fit)
     estimate = estimated(panel, model, options)
@@ -124,7 +167,11 @@ def _worth(panel: Panel, model: str, options: Options) -> tuple[np.ndarray, np.n
     lost = int((~np.isfinite(draws)).any(axis=1).sum())
     notes = []
     if lost and panel.people >= FEWEST_PEOPLE:
-        kept = "they are left out of the interval" if np.isfinite(low).all() else "too many for an interval"
+        kept = (
+            "they are left out of the interval"
+            if np.isfinite(low).all()
+            else "too many for an interval"
+        )
         notes.append(f"{lost} of {options.resamples} resamples have no finite worths; {kept}")
     return estimate, low, high, notes
 
@@ -132,17 +179,30 @@ def _worth(panel: Panel, model: str, options: Options) -> tuple[np.ndarray, np.n
 def _caveats(panel: Panel, fit: Ordinal) -> list[str]:
     most = _answers_each(panel)
     if most <= NO_TASTE:
-        return [f"at most {most} answers a participant: tastes of their own cannot be told from noise and are not in the model"]
+        return [
+            (
+                f"at most {most} answers a participant: tastes of their own cannot be told from "
+                "noise and are not in the model"
+            )
+        ]
     if most <= FEW_ANSWERS and len(panel.items) > QUADRATURE_ITEMS and fit.sd_preference > 0.5:
-        return [f"at most {most} answers a participant and tastes that differ: Laplace's approximation makes worths a few per cent small"]
+        return [
+            (
+                f"at most {most} answers a participant and tastes that differ: Laplace's "
+                "approximation makes worths a few per cent small"
+            )
+        ]
     return []
 
 
-# --- binary models -----------------------------------------------------------------------------------------------------------------
+# --- binary models
+# -----------------------------------------------------------------------------
 
 
 def bradley_terry(wins: np.ndarray) -> np.ndarray:
-    """wins (..., n, n), how often i was preferred to j -> (..., n) worths in logits, sum 0; NaN where there is no finite maximum."""
+    """wins (..., n, n), how often i was preferred to j -> (..., n) worths in logits, sum 0; NaN
+    where there is no finite maximum.
+    """
 
     def derivatives(d, over, under):
         p = special.expit(d)
@@ -153,7 +213,9 @@ def bradley_terry(wins: np.ndarray) -> np.ndarray:
 
 
 def thurstone_jod(wins: np.ndarray) -> np.ndarray:
-    """wins (..., n, n), how often i was preferred to j -> (..., n) worths in JOD, sum 0; NaN where there is no finite maximum."""
+    """wins (..., n, n), how often i was preferred to j -> (..., n) worths in JOD, sum 0; NaN where
+    there is no finite maximum.
+    """
 
     def derivatives(d, over, under):
         density = np.exp(-0.5 * d * d) / np.sqrt(2 * np.pi)
@@ -185,7 +247,9 @@ def _differences(n: int) -> np.ndarray:
 
 
 def _newton(x: np.ndarray, data: tuple[np.ndarray, ...], derivatives: Callable) -> np.ndarray:
-    """Maximise many concave functions of x w at once; x (K, n), data (R, K) each -> w (R, n), sum 0, NaN where none is found."""
+    """Maximise many concave functions of x w at once; x (K, n), data (R, K) each -> w (R, n), sum
+    0, NaN where none is found.
+    """
     n = x.shape[1]
     outer = (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
     w = np.zeros((len(data[0]), n))
@@ -193,7 +257,8 @@ def _newton(x: np.ndarray, data: tuple[np.ndarray, ...], derivatives: Callable) 
     for _ in range(ITERATIONS):
         slope, curvature = derivatives(w[active] @ x.T, *(one[active] for one in data))
         information = (curvature @ outer).reshape(-1, n, n)
-        # The information is blind to a common shift: a constant matrix fills that direction and leaves the rest.
+        # The information is blind to a common shift: a constant matrix fills that direction and
+        # leaves the rest.
         information += information[:, range(n), range(n)].mean(axis=1)[:, None, None] / n
         step = _solved(information, slope @ x)
         length = np.abs(step).max(axis=1)
@@ -210,12 +275,15 @@ def _newton(x: np.ndarray, data: tuple[np.ndarray, ...], derivatives: Callable) 
 def _solved(information: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """Newton steps (R, n) for informations (R, n, n) and slopes (R, n)."""
     size = range(slope.shape[1])
-    information[:, size, size] += RIDGE * information[:, size, size].mean(axis=1, keepdims=True) + np.finfo(float).tiny
+    information[:, size, size] += (
+        RIDGE * information[:, size, size].mean(axis=1, keepdims=True) + np.finfo(float).tiny
+    )
     return np.linalg.solve(information, slope[..., None])[..., 0]
 
 
 def davidson(wins: np.ndarray, ties: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """wins and symmetric ties (..., n, n) -> worths (..., n), sum 0, and log nu (...); without ties Bradley-Terry and -inf.
+    """wins and symmetric ties (..., n, n) -> worths (..., n), sum 0, and log nu (...); without ties
+    Bradley-Terry and -inf.
 
     NaN where there is no finite maximum.
     """
@@ -231,11 +299,15 @@ def davidson(wins: np.ndarray, ties: np.ndarray) -> tuple[np.ndarray, np.ndarray
         log_nu[without & np.isfinite(worth[:, 0])] = -np.inf
     exists = ~without & strongly_connected(wins + ties) & ((over + under).sum(axis=1) > 0)
     if n > 1 and exists.any():
-        worth[exists], log_nu[exists] = _davidson(_differences(n), over[exists], under[exists], level[exists])
+        worth[exists], log_nu[exists] = _davidson(
+            _differences(n), over[exists], under[exists], level[exists]
+        )
     return worth.reshape(shape), log_nu.reshape(shape[:-1])
 
 
-def _davidson(x: np.ndarray, over: np.ndarray, under: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _davidson(
+    x: np.ndarray, over: np.ndarray, under: np.ndarray, level: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     n, total = x.shape[1], over + under + level
     outer = (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
     theta = np.zeros((len(over), n + 1))
@@ -267,11 +339,14 @@ def _davidson(x: np.ndarray, over: np.ndarray, under: np.ndarray, level: np.ndar
     return theta[:, :n] - theta[:, :n].mean(axis=1, keepdims=True), theta[:, n]
 
 
-# --- fits that do not exist --------------------------------------------------------------------------------------------------------
+# --- fits that do not exist
+# -----------------------------------------------------------------------------
 
 
 def strongly_connected(wins: np.ndarray) -> np.ndarray:
-    """wins (R, n, n) -> (R,) bool: from every item a chain of wins leads to every other one (Ford 1957, doi:10.2307/2308513)."""
+    """wins (R, n, n) -> (R,) bool: from every item a chain of wins leads to every other one (Ford
+    1957, doi:10.2307/2308513).
+    """
     n = wins.shape[-1]
     reach = ((wins > 0) | np.eye(n, dtype=bool)).astype(np.float32)
     for _ in range(max(1, int(np.ceil(np.log2(max(n, 2)))))):
@@ -282,32 +357,51 @@ def strongly_connected(wins: np.ndarray) -> np.ndarray:
 def missing_fit(panel: Panel, model: str) -> str | None:
     """Why the model has no finite maximum for this panel, in words; None where it has one.
 
-    bradley_terry and thurstone_jod are held to the answers that prefer one of the two: a technique that was tied but never beaten is
-    named too, although half wins would give it a number. davidson and ordinal, which model 'no difference', are checked exactly: no
-    direction of the parameters may raise or keep the likelihood of every answer.
+    bradley_terry and thurstone_jod are held to the answers that prefer one of the two: a technique
+    that was tied but never beaten is named too, although half wins would give it a number. davidson
+    and ordinal, which model 'no difference', are checked exactly: no direction of the parameters
+    may raise or keep the likelihood of every answer.
     """
     counts = panel.counts
     strict, level = wins(panel, counts, "drop"), tied(panel, counts)
     if not strict.any():
         return "every answer is 'no difference'"
-    groups, label = csgraph.connected_components(strict + level > 0, directed=True, connection="weak")
+    groups, label = csgraph.connected_components(
+        strict + level > 0, directed=True, connection="weak"
+    )
     if groups > 1:
-        return f"{_names(panel, label == 0)} and {_names(panel, label != 0)} were never compared, not even through others"
+        return (
+            f"{_names(panel, label == 0)} and {_names(panel, label != 0)} were never "
+            "compared, not even through others"
+        )
     if model == "ordinal" and panel.people < FEWEST_PEOPLE:
-        return f"{panel.people} participants; what they share and what is their own needs {FEWEST_PEOPLE}"
+        return (
+            f"{panel.people} participants; what they share and what is their own needs "
+            f"{FEWEST_PEOPLE}"
+        )
     edges = strict if model in ("bradley_terry", "thurstone_jod") else strict + level
     groups, label = csgraph.connected_components(edges > 0, directed=True, connection="strong")
     if groups > 1:
         found = [
             (inside.sum(), order, never, inside)
             for inside in (label == group for group in range(groups))
-            for order, (never, matrix) in enumerate((("beaten by", edges), ("preferred to", edges.T)))
+            for order, (never, matrix) in enumerate(
+                (("beaten by", edges), ("preferred to", edges.T))
+            )
             if not matrix[np.ix_(~inside, inside)].any()
         ]
-        _, _, never, inside = min(found, key=lambda one: one[:2])  # a group at an end of the chain; the smallest is the one to name
-        return f"{_names(panel, inside)} {'was' if inside.sum() == 1 else 'were'} never {never} {_names(panel, ~inside)}"
+        _, _, never, inside = min(
+            found, key=lambda one: one[:2]
+        )  # a group at an end of the chain; the smallest is the one to name
+        return (
+            f"{_names(panel, inside)} {'was' if inside.sum() == 1 else 'were'} never "
+            f"{never} {_names(panel, ~inside)}"
+        )
     if model in ("davidson", "ordinal") and _separated(panel, model):
-        return "the answers are separated: worths and thresholds can grow together without end and only fit better"
+        return (
+            "the answers are separated: worths and thresholds can grow together without "
+            "end and only fit better"
+        )
     return None
 
 
@@ -316,7 +410,9 @@ def _names(panel: Panel, chosen: np.ndarray) -> str:
 
 
 def _separated(panel: Panel, model: str) -> bool:
-    """Whether a direction of recession exists: one that lowers the likelihood of no observed answer and raises that of some."""
+    """Whether a direction of recession exists: one that lowers the likelihood of no observed answer
+    and raises that of some.
+    """
     x = np.eye(len(panel.items))[panel.second] - np.eye(len(panel.items))[panel.first]
     if model == "davidson":
         sign = np.sign(np.arange(-2, 3))
@@ -326,7 +422,10 @@ def _separated(panel: Panel, model: str) -> bool:
         # Of e^(-d/2) : nu : e^(d/2) the observed one must not lose against either other.
         features = {-1: (-0.5, 0), 0: (0, 1), 1: (0.5, 0)}
         rows = [
-            [*(features[answer][0] - features[other][0]) * x[k], features[answer][1] - features[other][1]]
+            [
+                *(features[answer][0] - features[other][0]) * x[k],
+                features[answer][1] - features[other][1],
+            ]
             for k, answer in seen
             for other in features
             if other != answer
@@ -339,22 +438,33 @@ def _separated(panel: Panel, model: str) -> bool:
         for left in (True, False):
             for k in range(len(x)):
                 eta = [*x[k], 1.0 if left else -1.0]
-                for category in np.unique(rank[:, k][panel.answered[:, k] & (panel.first_left[:, k] == left)]):
+                for category in np.unique(
+                    rank[:, k][panel.answered[:, k] & (panel.first_left[:, k] == left)]
+                ):
                     if category < len(cuts):
                         rows.append([*(-np.array(eta)), *cuts[category]])
                     if category > 0:
                         rows.append([*eta, *(-cuts[category - 1])])
     rows = np.array(rows)
-    found = optimize.linprog(-rows.sum(axis=0), A_ub=-rows, b_ub=np.zeros(len(rows)), bounds=[(-1, 1)] * size, method="highs")
+    found = optimize.linprog(
+        -rows.sum(axis=0),
+        A_ub=-rows,
+        b_ub=np.zeros(len(rows)),
+        bounds=[(-1, 1)] * size,
+        method="highs",
+    )
     return bool(-found.fun > 1e-7)
 
 
-# --- the ordinal model -------------------------------------------------------------------------------------------------------------
+# --- the ordinal model
+# -----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Ordinal:
-    """worth, errors (n,): logits and their standard errors; the rest as in `parameters`; covariance of worth (n, n)."""
+    """worth, errors (n,): logits and their standard errors; the rest as in `parameters`; covariance
+    of worth (n, n).
+    """
 
     worth: np.ndarray
     errors: np.ndarray
@@ -370,7 +480,9 @@ class Ordinal:
 
 
 def fitted(panel: Panel) -> Ordinal | None:
-    """`ordinal`, once a panel; without random effects where nobody gave more than `NO_TASTE` answers, which cannot tell them from noise."""
+    """`ordinal`, once a panel; without random effects where nobody gave more than `NO_TASTE`
+    answers, which cannot tell them from noise.
+    """
     if "ordinal" not in panel.kept:
         panel.kept["ordinal"] = ordinal(panel, mixed=_answers_each(panel) > NO_TASTE)
     return panel.kept["ordinal"]
@@ -384,7 +496,8 @@ def _answers_each(panel: Panel) -> int:
 def _recoded(panel: Panel) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Only the strengths that were used have a category of their own.
 
-    Category of each answer (P, K), counted from 0; cuts (categories - 1, m): the cuts as sums of m positive increments; their names.
+    Category of each answer (P, K), counted from 0; cuts (categories - 1, m): the cuts as sums of m
+    positive increments; their names.
     """
     used = np.unique(np.abs(panel.preference[panel.answered].astype(int)))
     labels = {1: "threshold_slight", 2: "threshold_strong"}
@@ -395,7 +508,11 @@ def _recoded(panel: Panel) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
         category = sign * rank + len(positive)
         m = len(positive)
         upper = np.tril(np.ones((m, m)))
-        return np.where(panel.answered, category, 0), np.concatenate([-upper[::-1], upper]), tuple(labels[s] for s in positive)
+        return (
+            np.where(panel.answered, category, 0),
+            np.concatenate([-upper[::-1], upper]),
+            tuple(labels[s] for s in positive),
+        )
     m = len(positive) - 1
     category = np.where(sign > 0, rank + m + 1, m - rank)
     upper = np.tril(np.ones((m, m)))
@@ -404,12 +521,21 @@ def _recoded(panel: Panel) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
 
 
 def ordinal(panel: Panel, mixed: bool = True) -> Ordinal | None:
-    """Fit the cumulative-link model of this module's docstring; without `mixed`, v = s = 0. None where no maximum is found."""
+    """Fit the cumulative-link model of this module's docstring; without `mixed`, v = s = 0. None
+    where no maximum is found.
+    """
     problem = _Likelihood(panel, mixed)
     theta = _climb(problem, problem.start())
-    if theta is not None and mixed and len(panel.items) <= QUADRATURE_ITEMS and _answers_each(panel) <= FEW_ANSWERS:
+    if (
+        theta is not None
+        and mixed
+        and len(panel.items) <= QUADRATURE_ITEMS
+        and _answers_each(panel) <= FEW_ANSWERS
+    ):
         laplace = problem
-        theta[-2:] = np.maximum(np.abs(theta[-2:]), 0.2)  # at a spread of 0 the slope is 0, whatever lies beside it
+        theta[-2:] = np.maximum(
+            np.abs(theta[-2:]), 0.2
+        )  # at a spread of 0 the slope is 0, whatever lies beside it
         for _ in range(2):  # the points follow the modes
             if theta is not None:
                 problem = _Quadrature(laplace, theta)
@@ -419,7 +545,9 @@ def ordinal(panel: Panel, mixed: bool = True) -> Ordinal | None:
 
 def _climb(problem: _Likelihood, start: np.ndarray) -> np.ndarray | None:
     """The parameters at the maximum: BFGS, then Newton's steps; None where none is found."""
-    theta = optimize.minimize(problem, start, jac=True, method="BFGS", options={"gtol": 10 * problem.flat, "maxiter": 300}).x
+    theta = optimize.minimize(
+        problem, start, jac=True, method="BFGS", options={"gtol": 10 * problem.flat, "maxiter": 300}
+    ).x
     for _ in range(4):
         value, slope = problem(theta)
         if np.abs(slope).max() < problem.flat:
@@ -431,14 +559,16 @@ def _climb(problem: _Likelihood, start: np.ndarray) -> np.ndarray | None:
         if not problem(theta - step)[0] <= value + 1e-12:
             break
         theta = theta - step
-    return None if np.abs(problem(theta)[1]).max() > 1e-5 or np.abs(theta).max() > FARTHEST else theta
+    return (
+        None if np.abs(problem(theta)[1]).max() > 1e-5 or np.abs(theta).max() > FARTHEST else theta
+    )
 
 
 class _Likelihood:
     """Minus the mean log-likelihood of an answer and its gradient.
 
-    Parameters: worths in an orthonormal basis of the contrasts (n - 1), side, log increments of the thresholds (m), sd_preference,
-    sd_side (either sign: only the square counts).
+    Parameters: worths in an orthonormal basis of the contrasts (n - 1), side, log increments of the
+    thresholds (m), sd_preference, sd_side (either sign: only the square counts).
     """
 
     flat = 1e-8  # a slope at which the maximum is reached
@@ -469,15 +599,19 @@ class _Likelihood:
         return theta[: n - 1], theta[n - 1], np.exp(theta[n : n + m]), spread
 
     def _ends(self, eta: np.ndarray, tau: np.ndarray):
-        """F at the upper and the lower end of each answer's category, 1 and 0 beyond the last cuts."""
+        """F at the upper and the lower end of each answer's category, 1 and 0 beyond the last
+        cuts.
+        """
         edges = np.concatenate([[-np.inf], tau, [np.inf]])
-        return special.expit(edges[self.category + 1] - eta), special.expit(edges[self.category] - eta)
+        return special.expit(edges[self.category + 1] - eta), special.expit(
+            edges[self.category] - eta
+        )
 
     def __call__(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
         worth, side, increments, (sd_v, sd_s) = self._split(theta)
         tau = self.cuts @ increments
         fixed = self.x @ worth + self.sign * side  # (P, K)
-        b, h, q = self.mode, None, None
+        b, h, _q = self.mode, None, None
         if self.mixed:
             z = np.empty((*fixed.shape, self.n))
             z[..., :-1] = sd_v * self.x
@@ -502,7 +636,11 @@ class _Likelihood:
         f_up, f_low = up * (1 - up), low * (1 - low)
         width = np.diff(np.concatenate([[-np.inf], tau, [np.inf]]))[self.category]
         # F(u) - F(l) = F(u) (1 - F(l)) (1 - e^(l - u)), and u - l does not depend on eta.
-        value = np.log(np.maximum(up, 1e-300)) + np.log1p(-np.minimum(low, 1 - 1e-16)) + np.log(-np.expm1(-width))
+        value = (
+            np.log(np.maximum(up, 1e-300))
+            + np.log1p(-np.minimum(low, 1 - 1e-16))
+            + np.log(-np.expm1(-width))
+        )
         slope = (up + low - 1) * self.mask
         total = float((value * self.mask).sum())
         grow = np.where(np.isfinite(width), 1 / np.expm1(np.minimum(width, 700)), 0.0)
@@ -516,7 +654,9 @@ class _Likelihood:
             solved = np.linalg.solve(information, zt)  # (P, n, K): H^-1 z
             h = np.einsum("pkd,pdk->pk", z, solved)
             bend = -(d_up + d_low) * self.mask  # d kappa / d eta
-            r = (solved @ (0.5 * bend * h)[..., None])[..., 0]  # H^-1 times the gradient of log|H|/2 in b
+            r = (solved @ (0.5 * bend * h)[..., None])[
+                ..., 0
+            ]  # H^-1 times the gradient of log|H|/2 in b
             m = (z @ r[..., None])[..., 0]
             score = slope - 0.5 * bend * h + kappa * m
             to_up = to_up - (0.5 * h * d_up + m * f_up) * self.mask
@@ -525,27 +665,37 @@ class _Likelihood:
             turned = np.einsum("kd,pdk->pk", self.x, solved[:, :-1]), self.sign * solved[:, -1]
             shifted = r[:, :-1] @ self.x.T, self.sign * r[:, -1:]
             spread = [
-                (score * one - kappa * two - slope * three).sum() for one, two, three in zip(own, turned, shifted, strict=True)
+                (score * one - kappa * two - slope * three).sum()
+                for one, two, three in zip(own, turned, shifted, strict=True)
             ]
         last = len(tau)
         to_tau = np.bincount(self.category.ravel(), to_up.ravel(), last + 1)[:last]
         to_tau = to_tau + np.bincount(self.category.ravel(), to_low.ravel(), last + 1)[1:]
         gradient = np.concatenate(
-            [score.sum(axis=0) @ self.x, [(score * self.sign).sum()], (to_tau @ self.cuts) * increments, spread]
+            [
+                score.sum(axis=0) @ self.x,
+                [(score * self.sign).sum()],
+                (to_tau @ self.cuts) * increments,
+                spread,
+            ]
         )
         return -total / self.answers, -gradient / self.answers
 
     def information(self, theta: np.ndarray) -> np.ndarray:
         """The Hessian of the mean, from central differences of the gradient."""
         size, step = len(theta), 1e-4
-        rows = [(self(theta + step * e)[1] - self(theta - step * e)[1]) / (2 * step) for e in np.eye(size)]
+        rows = [
+            (self(theta + step * e)[1] - self(theta - step * e)[1]) / (2 * step)
+            for e in np.eye(size)
+        ]
         return (np.array(rows) + np.array(rows).T) / 2
 
     def result(self, theta: np.ndarray) -> Ordinal | None:
         information = self.information(theta) * self.answers
         size = self.n  # worths and side
         if self.mixed:
-            # At a spread of 0 the likelihood is even in it: flat there to second order or curved either way, and not coupled to the rest.
+            # At a spread of 0 the likelihood is even in it: flat there to second order or curved
+            # either way, and not coupled to the rest.
             keep = [k for k in range(len(theta)) if k < self.n + self.m or abs(theta[k]) > 1e-3]
             information = information[np.ix_(keep, keep)]
         eigenvalues = np.linalg.eigvalsh(information)
@@ -570,10 +720,12 @@ class _Likelihood:
 
 
 class _Quadrature(_Likelihood):
-    """The same by adaptive Gauss-Hermite quadrature, for few answers a person, where Laplace's approximation is poor.
+    """The same by adaptive Gauss-Hermite quadrature, for few answers a person, where Laplace's
+    approximation is poor.
 
-    Each person's points stand about their mode at `theta`, as wide as the curvature there, and stay: value and gradient are those of
-    one smooth function. Liu and Pierce 1994, doi:10.1093/biomet/81.3.624.
+    Each person's points stand about their mode at `theta`, as wide as the curvature there, and
+    stay: value and gradient are those of one smooth function. Liu and Pierce 1994,
+    doi:10.1093/biomet/81.3.624.
     """
 
     flat = 1e-6
@@ -583,12 +735,19 @@ class _Quadrature(_Likelihood):
         vars(self).update(vars(laplace))
         n = self.n
         node, weight = np.polynomial.hermite_e.hermegauss(POINTS)
-        z, mass = (np.stack(np.meshgrid(*[one] * n, indexing="ij"), axis=-1).reshape(-1, n) for one in (node, weight))
+        z, mass = (
+            np.stack(np.meshgrid(*[one] * n, indexing="ij"), axis=-1).reshape(-1, n)
+            for one in (node, weight)
+        )
         values, vectors = np.linalg.eigh(self.curvature)
         root = (vectors / np.sqrt(values)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
         self.points = self.mode[:, None, :] + z @ root  # (P, M, n)
-        mass = np.log(np.prod(mass, axis=1)) + 0.5 * (z * z).sum(axis=1) - 0.5 * n * np.log(2 * np.pi)
-        self.log_mass = mass - 0.5 * (self.points**2).sum(axis=2) - 0.5 * np.log(values).sum(axis=1)[:, None]
+        mass = (
+            np.log(np.prod(mass, axis=1)) + 0.5 * (z * z).sum(axis=1) - 0.5 * n * np.log(2 * np.pi)
+        )
+        self.log_mass = (
+            mass - 0.5 * (self.points**2).sum(axis=2) - 0.5 * np.log(values).sum(axis=1)[:, None]
+        )
 
     def __call__(self, theta: np.ndarray) -> tuple[float, np.ndarray]:
         worth, side, increments, (sd_v, sd_s) = self._split(theta)
@@ -598,12 +757,18 @@ class _Quadrature(_Likelihood):
         step = max(1, (1 << 20) // (self.points.shape[1] * self.category.shape[1]))
         for start in range(0, len(self.points), step):
             part = slice(start, start + step)
-            category, sign, mask = (one[part, None] for one in (self.category, self.sign, self.mask))  # (p, 1, K)
+            category, sign, mask = (
+                one[part, None] for one in (self.category, self.sign, self.mask)
+            )  # (p, 1, K)
             taste, lean = self.points[part, :, :-1] @ self.x.T, self.points[part, :, -1:]
             eta = self.x @ worth + sd_v * taste + sign * (side + sd_s * lean)  # (p, M, K)
             up, low = special.expit(edges[category + 1] - eta), special.expit(edges[category] - eta)
             width = edges[category + 1] - edges[category]
-            value = np.log(np.maximum(up, 1e-300)) + np.log1p(-np.minimum(low, 1 - 1e-16)) + np.log(-np.expm1(-width))
+            value = (
+                np.log(np.maximum(up, 1e-300))
+                + np.log1p(-np.minimum(low, 1 - 1e-16))
+                + np.log(-np.expm1(-width))
+            )
             joint = self.log_mass[part] + (value * mask).sum(axis=2)
             top = joint.max(axis=1, keepdims=True)
             share = np.exp(joint - top)
@@ -613,8 +778,19 @@ class _Quadrature(_Likelihood):
             score = share * (up + low - 1)
             grow = np.where(np.isfinite(width), 1 / np.expm1(np.minimum(width, 700)), 0.0)
             slopes[: self.n - 1] += score.sum(axis=(0, 1)) @ self.x
-            slopes[self.n - 1 :] += (score * sign).sum(), (score * taste).sum(), (score * sign * lean).sum()
-            for end, slope in ((category + 1, share * (1 - up + grow)), (category, -share * (low + grow))):
-                to_tau += np.bincount(end.ravel(), slope.sum(axis=1).ravel(), len(edges) + 1)[: len(edges)]
-        gradient = np.concatenate([slopes[: self.n], (to_tau[1:-1] @ self.cuts) * increments, slopes[self.n :]])
+            slopes[self.n - 1 :] += (
+                (score * sign).sum(),
+                (score * taste).sum(),
+                (score * sign * lean).sum(),
+            )
+            for end, slope in (
+                (category + 1, share * (1 - up + grow)),
+                (category, -share * (low + grow)),
+            ):
+                to_tau += np.bincount(end.ravel(), slope.sum(axis=1).ravel(), len(edges) + 1)[
+                    : len(edges)
+                ]
+        gradient = np.concatenate(
+            [slopes[: self.n], (to_tau[1:-1] @ self.cuts) * increments, slopes[self.n :]]
+        )
         return -total / self.answers, -gradient / self.answers

@@ -1,6 +1,8 @@
-"""Figures of what was estimated: worths, the JOD ladder, differences and their margin, the trend, agreement, cost and power.
+"""Figures of what was estimated: worths, the JOD ladder, differences and their margin, the trend,
+agreement, cost and power.
 
-Where the thesis shows counts in bars these show estimates with their intervals, in the same palette and at the same widths.
+Where the thesis shows counts in bars these show estimates with their intervals, in the same palette
+and at the same widths.
 """
 
 from __future__ import annotations
@@ -14,10 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from . import figures
-from .codebook import FRAMING, Codebook
-from .figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
-from .options import OVERALL
+from analysis import figures
+from analysis.codebook import FRAMING, Codebook
+from analysis.figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
+from analysis.options import OVERALL
 
 #: Model -> its name and the unit of its worths.
 MODELS = {
@@ -51,21 +53,34 @@ def framing_label(codebook: Codebook, name: str) -> str:
 
 
 def verdict(row: object, alpha: float) -> str:
-    """What a row of pairs.csv comes to, as a key of `VERDICTS`; both tests are taken after Holm's correction.
+    """What a row of pairs.csv comes to, as a key of `VERDICTS`; both tests are taken after Holm's
+    correction.
 
-    As good as each other: within the margin by the interval (`equivalent`) and by both one-sided tests. Where a margin was declared in
-    JOD alone there is no such test, and the interval decides.
+    As good as each other: within the margin by the interval (`equivalent`) and by both one-sided
+    tests. Where a margin was declared in JOD alone there is no such test, and the interval decides.
     """
     differs = row.holm_p <= alpha
     if np.isfinite(row.equivalent):
         equal = row.equivalent == 1 and row.tost_holm_p <= alpha
     else:
         equal = row.jod_equivalent == 1
-    return "both" if differs and equal else "different" if differs else "equivalent" if equal else "undecided"
+    return (
+        "both"
+        if differs and equal
+        else "different"
+        if differs
+        else "equivalent"
+        if equal
+        else "undecided"
+    )
 
 
 def draw_results(
-    tables: Mapping[str, pd.DataFrame], codebook: Codebook, margin: float | None, alpha: float, simulated: bool
+    tables: Mapping[str, pd.DataFrame],
+    codebook: Codebook,
+    margin: float | None,
+    alpha: float,
+    simulated: bool,
 ) -> list[Picture]:
     """The figures of `compute.everything`'s tables, without those that have nothing to show."""
     drawn = [
@@ -79,7 +94,9 @@ def draw_results(
     return [picture for picture in drawn if picture is not None]
 
 
-def draw_worths(worths: pd.DataFrame, codebook: Codebook, simulated: bool = False) -> Picture | None:
+def draw_worths(
+    worths: pd.DataFrame, codebook: Codebook, simulated: bool = False
+) -> Picture | None:
     """Every model at every framing: estimates with intervals, each model in its unit."""
     found = worths[worths.estimate.notna()]
     if found.empty:
@@ -87,11 +104,16 @@ def draw_worths(worths: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
     return figures._picture(
         "worths",
         "Worths with their intervals",
-        "Each technique's worth in four models, centred on 0 within a " + codebook.level + "; lines are intervals: over resampled "
-        "participants, for the ordinal model by Wald. Models have units of their own: compare the order and the gaps against the intervals, not the numbers.",
+        "Each technique's worth in four models, centred on 0 within a "
+        + codebook.level
+        + "; lines are intervals: over resampled "
+        "participants, for the ordinal model by Wald. Models have units of their own: "
+        "compare the order and the gaps against the intervals, not the numbers.",
         "; ".join(
             f"{framing_label(codebook, framing)}, {MODELS.get(model, (model, ''))[0]}: "
-            + ", ".join(f"{codebook.label(row.technique)} {row.estimate:z.2f}" for row in rows.itertuples())
+            + ", ".join(
+                f"{codebook.label(row.technique)} {row.estimate:z.2f}" for row in rows.itertuples()
+            )
             for (framing, model), rows in found.groupby(["framing", "model"], sort=False)
         ),
         _worths,
@@ -102,7 +124,10 @@ def draw_worths(worths: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
 
 
 def _worths(worths: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings, models = list(dict.fromkeys(worths.framing)), [name for name in MODELS if name in set(worths.model)]
+    framings, models = (
+        list(dict.fromkeys(worths.framing)),
+        [name for name in MODELS if name in set(worths.model)],
+    )
     techniques = [name for name in codebook.techniques if name in set(worths.technique)]
     labels = [figures._wrapped(codebook.label(name), 16) for name in techniques]
     height = 0.3 + figures._row_in(labels) * 0.85 * len(labels)
@@ -111,14 +136,25 @@ def _worths(worths: pd.DataFrame, codebook: Codebook) -> Figure:
     for row, framing in enumerate(framings):
         for column, model in enumerate(models):
             ax = axes[row, column]
-            here = worths[(worths.framing == framing) & (worths.model == model)].set_index("technique")
+            here = worths[(worths.framing == framing) & (worths.model == model)].set_index(
+                "technique"
+            )
             ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
             for place, technique in enumerate(techniques):
                 if technique in here.index:
                     one = here.loc[technique]
                     _interval(ax, one.estimate, one.low, one.high, place)
             if here.empty:
-                ax.text(0.5, 0.5, "no finite worths", transform=ax.transAxes, ha="center", style="italic", size=7, color="#666666")
+                ax.text(
+                    0.5,
+                    0.5,
+                    "no finite worths",
+                    transform=ax.transAxes,
+                    ha="center",
+                    style="italic",
+                    size=7,
+                    color="#666666",
+                )
             ax.set_yticks(range(len(labels)), labels)
             ax.set_ylim(len(labels) - 0.5, -0.5)
             ax.xaxis.set_major_locator(MaxNLocator(4))
@@ -130,18 +166,29 @@ def _worths(worths: pd.DataFrame, codebook: Codebook) -> Figure:
                 ax.set_xlabel(unit)
             if column == len(models) - 1:
                 ax.annotate(
-                    framing_label(codebook, framing), (1.02, 0.5), xycoords="axes fraction", rotation=270, va="center", weight="bold"
+                    framing_label(codebook, framing),
+                    (1.02, 0.5),
+                    xycoords="axes fraction",
+                    rotation=270,
+                    va="center",
+                    weight="bold",
                 )
     return figure
 
 
-def _interval(ax: Axes, value: float, low: float, high: float, y: float, colour: str = BLUE, marker: str = "o") -> None:
+def _interval(
+    ax: Axes, value: float, low: float, high: float, y: float, colour: str = BLUE, marker: str = "o"
+) -> None:
     if np.isfinite(low) and np.isfinite(high):
         ax.plot([low, high], [y, y], color=colour, linewidth=1.6, solid_capstyle="butt")
-    ax.plot(value, y, marker, color=colour, markersize=4.5, markeredgewidth=1.3 if marker == "x" else 0)
+    ax.plot(
+        value, y, marker, color=colour, markersize=4.5, markeredgewidth=1.3 if marker == "x" else 0
+    )
 
 
-def draw_ladder(worths: pd.DataFrame, codebook: Codebook, simulated: bool = False) -> Picture | None:
+def draw_ladder(
+    worths: pd.DataFrame, codebook: Codebook, simulated: bool = False
+) -> Picture | None:
     """The JOD of all techniques on one vertical scale, one ladder a framing."""
     found = worths[(worths.model == "thurstone_jod") & worths.estimate.notna()]
     if found.empty:
@@ -149,11 +196,17 @@ def draw_ladder(worths: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
     return figures._picture(
         "jod_ladder",
         "The JOD ladder",
-        "Thurstone case V worths in just-objectionable differences: of two techniques 1 JOD apart, three of four answers prefer the "
-        "upper one. Bars are intervals over resampled participants; 0 is the mean of the " + codebook.level + ".",
+        "Thurstone case V worths in just-objectionable differences: of two techniques 1 JOD "
+        "apart, three of four answers prefer the "
+        "upper one. Bars are intervals over resampled participants; 0 is the mean of the "
+        + codebook.level
+        + ".",
         "; ".join(
             f"{framing_label(codebook, framing)}: "
-            + ", ".join(f"{codebook.label(row.technique)} {row.estimate:z.2f} JOD" for row in rows.itertuples())
+            + ", ".join(
+                f"{codebook.label(row.technique)} {row.estimate:z.2f} JOD"
+                for row in rows.itertuples()
+            )
             for framing, rows in found.groupby("framing", sort=False)
         ),
         _ladder,
@@ -167,7 +220,9 @@ def _ladder(found: pd.DataFrame, codebook: Codebook) -> Figure:
     framings = list(dict.fromkeys(found.framing))
     most = found.groupby("framing", sort=False).size().max()
     columns = min(4, len(framings))
-    figure, panels = figures._panels(len(framings), columns, max(2.5, 0.19 * most), below_in=0.2, sharey=True)
+    figure, panels = figures._panels(
+        len(framings), columns, max(2.5, 0.19 * most), below_in=0.2, sharey=True
+    )
     ends = found[["low", "high", "estimate"]].to_numpy()
     low, high = np.nanmin(ends), np.nanmax(ends)
     room = max(high - low, 0.1)
@@ -176,10 +231,24 @@ def _ladder(found: pd.DataFrame, codebook: Codebook) -> Figure:
         gap = room * 1.1 / max(11, 1.15 * most)
         for row, y in zip(here.itertuples(), _apart(here.estimate.to_numpy(), gap), strict=True):
             if np.isfinite(row.low) and np.isfinite(row.high):
-                ax.plot([0, 0], [row.low, row.high], color=SKY, linewidth=5, alpha=0.45, solid_capstyle="butt", zorder=1)
+                ax.plot(
+                    [0, 0],
+                    [row.low, row.high],
+                    color=SKY,
+                    linewidth=5,
+                    alpha=0.45,
+                    solid_capstyle="butt",
+                    zorder=1,
+                )
             ax.plot([-0.12, 0.12], [row.estimate] * 2, color=BLUE, linewidth=2, zorder=3)
             ax.plot([0.14, 0.3], [row.estimate, y], color="#888888", linewidth=0.6)
-            ax.text(0.33, y, figures._cut(codebook.label(row.technique), 18), va="center_baseline", size=7.5)
+            ax.text(
+                0.33,
+                y,
+                figures._cut(codebook.label(row.technique), 18),
+                va="center_baseline",
+                size=7.5,
+            )
         ax.axhline(0, color="#888888", linewidth=0.7, zorder=0)
         ax.set_title(figures._cut(framing_label(codebook, framing), 20), loc="left")
         ax.set_xlim(-0.25, 1.75)
@@ -194,7 +263,9 @@ def _ladder(found: pd.DataFrame, codebook: Codebook) -> Figure:
 
 
 def _apart(values: np.ndarray, gap: float) -> np.ndarray:
-    """Places for labels near ascending `values`, at least `gap` apart, moved as little as blocks of neighbours allow."""
+    """Places for labels near ascending `values`, at least `gap` apart, moved as little as blocks of
+    neighbours allow.
+    """
     blocks = [[float(value), 1] for value in values]  # middle, labels
     at = 0
     while at + 1 < len(blocks):
@@ -208,7 +279,11 @@ def _apart(values: np.ndarray, gap: float) -> np.ndarray:
 
 
 def draw_pairs(
-    pairs: pd.DataFrame, codebook: Codebook, margin: float | None, alpha: float = 0.05, simulated: bool = False
+    pairs: pd.DataFrame,
+    codebook: Codebook,
+    margin: float | None,
+    alpha: float = 0.05,
+    simulated: bool = False,
 ) -> Picture | None:
     """Every pair's mean preference and interval beside the margin of equivalence."""
     found = pairs[pairs.mean_preference.notna()]
@@ -216,18 +291,31 @@ def draw_pairs(
         return None
     verdicts = [verdict(row, alpha) for row in found.itertuples()]
     about = (
-        f"The band is the margin of equivalence, {margin:g} points, and the interval that of the equivalence test where there is one. "
+        (
+            f"The band is the margin of equivalence, {margin:g} points, and the interval that of "
+            "the equivalence test where there is one. "
+        )
         if margin
-        else "No margin of equivalence was declared, so no pair can be called as good as each other. "
+        else (
+            "No margin of equivalence was declared, so no pair can be called as good as "
+            "each other. "
+        )
     )
     return figures._picture(
         "pairs",
         "Every difference, with its interval" + (" and the margin" if margin else ""),
-        "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: left of 0 for the first technique, right for the second. "
+        (
+            "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: left of 0 for "
+            "the first technique, right for the second. "
+        )
         + about
-        + "Colour and marker say what the tests come to after Holm's correction, for differences and for equivalence.",
+        + (
+            "Colour and marker say what the tests come to after Holm's correction, for "
+            "differences and for equivalence."
+        ),
         "; ".join(
-            f"{framing_label(codebook, row.framing)}: {codebook.label(row.a)} against {codebook.label(row.b)} "
+            f"{framing_label(codebook, row.framing)}: {codebook.label(row.a)} against "
+            f"{codebook.label(row.b)} "
             f"{row.mean_preference:+z.2f}, {VERDICTS[one][0]}"
             for row, one in zip(found.itertuples(), verdicts, strict=True)
         ),
@@ -242,10 +330,15 @@ def draw_pairs(
 def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Figure:
     framings = list(dict.fromkeys(found.framing))
     names = list(dict.fromkeys(zip(found.a, found.b, strict=True)))
-    labels = [f"{figures._cut(codebook.label(a), 16)} \N{EN DASH} {figures._cut(codebook.label(b), 16)}" for a, b in names]
+    labels = [
+        f"{figures._cut(codebook.label(a), 16)} \N{EN DASH} {figures._cut(codebook.label(b), 16)}"
+        for a, b in names
+    ]
     columns = min(4, len(framings))
-    figure, panels = figures._panels(len(framings), columns, 0.45 + 0.19 * len(names), below_in=0.45, sharex=True, sharey=True)
-    for place, (ax, framing) in enumerate(zip(panels, framings, strict=True)):
+    figure, panels = figures._panels(
+        len(framings), columns, 0.45 + 0.19 * len(names), below_in=0.45, sharex=True, sharey=True
+    )
+    for _place, (ax, framing) in enumerate(zip(panels, framings, strict=True)):
         if margin:
             ax.axvspan(-margin, margin, color=SKY, alpha=0.22, linewidth=0)
         ax.axvline(0, color=INK, linewidth=0.7)
@@ -254,7 +347,9 @@ def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Fig
             if margin and np.isfinite(row.equivalence_low):
                 low, high = row.equivalence_low, row.equivalence_high
             _, colour, marker = VERDICTS[row.verdict]
-            _interval(ax, row.mean_preference, low, high, names.index((row.a, row.b)), colour, marker)
+            _interval(
+                ax, row.mean_preference, low, high, names.index((row.a, row.b)), colour, marker
+            )
         ax.set_title(figures._cut(framing_label(codebook, framing), 18), loc="left")
         ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
@@ -262,14 +357,26 @@ def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Fig
         ax.set_xticks(range(-2, 3))
         ax.tick_params(labelbottom=True)
         ax.grid(axis="x")
-    panels[(len(panels) - 1) // 2].set_xlabel("\N{LEFTWARDS ARROW} first technique      mean preference      second technique \N{RIGHTWARDS ARROW}")
+    panels[(len(panels) - 1) // 2].set_xlabel(
+        "\N{LEFTWARDS ARROW} first technique      mean preference      second technique "
+        "\N{RIGHTWARDS ARROW}"
+    )
     used = [one for one in VERDICTS if one in set(found.verdict)]
-    keys = [Line2D([], [], color=VERDICTS[one][1], marker=VERDICTS[one][2], markersize=4.5, linewidth=1.6) for one in used]
-    figure.legend(keys, [VERDICTS[one][0] for one in used], loc="outside lower center", ncols=len(used))
+    keys = [
+        Line2D(
+            [], [], color=VERDICTS[one][1], marker=VERDICTS[one][2], markersize=4.5, linewidth=1.6
+        )
+        for one in used
+    ]
+    figure.legend(
+        keys, [VERDICTS[one][0] for one in used], loc="outside lower center", ncols=len(used)
+    )
     return figure
 
 
-def draw_scores(scores: pd.DataFrame, codebook: Codebook, simulated: bool = False) -> Picture | None:
+def draw_scores(
+    scores: pd.DataFrame, codebook: Codebook, simulated: bool = False
+) -> Picture | None:
     """The thesis's figure 5.3 with intervals: points as dots, so that overlap can be seen."""
     found = scores[scores.score.notna() & (scores.framing != OVERALL)]
     if found.empty:
@@ -277,11 +384,15 @@ def draw_scores(scores: pd.DataFrame, codebook: Codebook, simulated: bool = Fals
     return figures._picture(
         "scores_intervals",
         "Scores with their intervals",
-        "The points of figure 5.3 of the thesis with intervals over resampled participants: where intervals overlap widely, other people "
+        "The points of figure 5.3 of the thesis with intervals over resampled participants: "
+        "where intervals overlap widely, other people "
         "could have put the techniques in another order.",
         "; ".join(
             f"{codebook.framing_label(framing)}: "
-            + ", ".join(f"{codebook.label(row.technique)} {row.score:g} ({row.low:g} to {row.high:g})" for row in rows.itertuples())
+            + ", ".join(
+                f"{codebook.label(row.technique)} {row.score:g} ({row.low:g} to {row.high:g})"
+                for row in rows.itertuples()
+            )
             for framing, rows in found.groupby("framing", sort=False)
         ),
         _scores,
@@ -296,7 +407,12 @@ def _scores(found: pd.DataFrame, codebook: Codebook) -> Figure:
     techniques = [name for name in codebook.techniques if name in set(found.technique)]
     labels = [figures._wrapped(codebook.label(name)) for name in techniques]
     figure, panels = figures._panels(
-        len(framings), 3, 0.5 + figures._row_in(labels) * len(labels), below_in=0.25, sharex=True, sharey=True
+        len(framings),
+        3,
+        0.5 + figures._row_in(labels) * len(labels),
+        below_in=0.25,
+        sharex=True,
+        sharey=True,
     )
     for ax, framing in zip(panels, framings, strict=True):
         for row in found[found.framing == framing].itertuples():
@@ -312,7 +428,9 @@ def _scores(found: pd.DataFrame, codebook: Codebook) -> Figure:
     return figure
 
 
-def draw_agreement(agreement: pd.DataFrame, codebook: Codebook, simulated: bool = False) -> Picture | None:
+def draw_agreement(
+    agreement: pd.DataFrame, codebook: Codebook, simulated: bool = False
+) -> Picture | None:
     """Consistency within and agreement between people, framing by framing."""
     found = agreement[agreement.statistic.isin(DRAWN) & agreement.value.notna()]
     if found.empty:
@@ -320,10 +438,12 @@ def draw_agreement(agreement: pd.DataFrame, codebook: Codebook, simulated: bool 
     return figures._picture(
         "agreement",
         "Consistency and agreement",
-        "1 is perfect. For zeta 0 is as many circular triads as there can be, for u and alpha 0 is what chance gives. "
+        "1 is perfect. For zeta 0 is as many circular triads as there can be, for u and "
+        "alpha 0 is what chance gives. "
         "Lines are intervals where there are any.",
         "; ".join(
-            f"{framing_label(codebook, row.framing)}: {DRAWN[row.statistic]} {row.value:z.2f}" for row in found.itertuples()
+            f"{framing_label(codebook, row.framing)}: {DRAWN[row.statistic]} {row.value:z.2f}"
+            for row in found.itertuples()
         ),
         _agreement,
         found,
@@ -333,9 +453,14 @@ def draw_agreement(agreement: pd.DataFrame, codebook: Codebook, simulated: bool 
 
 
 def _agreement(found: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings, statistics = list(dict.fromkeys(found.framing)), [name for name in DRAWN if name in set(found.statistic)]
+    framings, statistics = (
+        list(dict.fromkeys(found.framing)),
+        [name for name in DRAWN if name in set(found.statistic)],
+    )
     labels = [figures._wrapped(framing_label(codebook, name), 16) for name in framings]
-    figure, panels = figures._panels(len(statistics), 3, 0.62 + figures._row_in(labels) * len(labels), sharex=True, sharey=True)
+    figure, panels = figures._panels(
+        len(statistics), 3, 0.62 + figures._row_in(labels) * len(labels), sharex=True, sharey=True
+    )
     for ax, statistic in zip(panels, statistics, strict=True):
         for row in found[found.statistic == statistic].itertuples():
             _interval(ax, row.value, row.low, row.high, framings.index(row.framing))
@@ -357,9 +482,13 @@ def draw_triads(participants: pd.DataFrame, simulated: bool = False) -> Picture 
     return figures._picture(
         "participants",
         "How consistent and how fast each person was",
-        "One dot a person: the coefficient of consistency (1: no circular triad) and the median time of an answer. "
+        "One dot a person: the coefficient of consistency (1: no circular triad) and the "
+        "median time of an answer. "
         "Crosses: those whom a declared rule excludes in the second pass.",
-        f"{len(participants)} people; consistency from {zeta.min():.2f} to {zeta.max():.2f}, median {zeta.median():.2f}"
+        (
+            f"{len(participants)} people; consistency from {zeta.min():.2f} to {zeta.max():.2f}, "
+            f"median {zeta.median():.2f}"
+        )
         if len(zeta)
         else f"{len(participants)} people; no consistency can be told",
         _participants,
@@ -374,14 +503,38 @@ def _participants(participants: pd.DataFrame) -> Figure:
     zeta = participants.zeta.to_numpy(float)
     seconds = participants.median_rt_ms.to_numpy(float) / 1000
     small = 2.2 if len(zeta) > 100 else 3.6
-    ax.plot(seconds[~out], zeta[~out], "o", color=BLUE, markersize=small, alpha=0.7, markeredgewidth=0, label="counted")
+    ax.plot(
+        seconds[~out],
+        zeta[~out],
+        "o",
+        color=BLUE,
+        markersize=small,
+        alpha=0.7,
+        markeredgewidth=0,
+        label="counted",
+    )
     if out.any():
-        ax.plot(seconds[out], zeta[out], "x", color=VERMILLION, markersize=small + 2, label="excluded in the second pass")
+        ax.plot(
+            seconds[out],
+            zeta[out],
+            "x",
+            color=VERMILLION,
+            markersize=small + 2,
+            label="excluded in the second pass",
+        )
         ax.legend(loc="lower right", fontsize=7)
     if np.isfinite(zeta).any():
         ax.set_ylim(min(0.0, float(np.nanmin(zeta))) - 0.05, 1.06)
     else:
-        ax.text(0.5, 0.5, "no triads were asked", transform=ax.transAxes, ha="center", style="italic", color="#666666")
+        ax.text(
+            0.5,
+            0.5,
+            "no triads were asked",
+            transform=ax.transAxes,
+            ha="center",
+            style="italic",
+            color="#666666",
+        )
     ax.set_xlim(left=0)
     ax.set_xlabel("median time of an answer, s")
     ax.set_ylabel("consistency (zeta)")
@@ -389,15 +542,24 @@ def _participants(participants: pd.DataFrame) -> Figure:
     return figure
 
 
-def draw_objective(table: pd.DataFrame, measure: str, about: str, codebook: Codebook, simulated: bool = False) -> Picture:
-    """Worth against one objective measure, with the Pareto front where less of it is better. table: see `objective.against_worth`."""
+def draw_objective(
+    table: pd.DataFrame, measure: str, about: str, codebook: Codebook, simulated: bool = False
+) -> Picture:
+    """Worth against one objective measure, with the Pareto front where less of it is better.
+
+    table: see `objective.against_worth`.
+    """
     return figures._picture(
         f"objective_{measure}",
         f"Worth against {about}",
-        "Thurstone case V worth with its interval. Ringed and joined: the Pareto front, techniques that no other one beats in worth "
+        "Thurstone case V worth with its interval. Ringed and joined: the Pareto front, "
+        "techniques that no other one beats in worth "
         f"without having more {about}.",
         "; ".join(
-            f"{framing_label(codebook, row.framing)}, {codebook.label(row.technique)}: {row.value:g}, {row.estimate:z.2f} JOD"
+            (
+                f"{framing_label(codebook, row.framing)}, {codebook.label(row.technique)}: "
+                f"{row.value:g}, {row.estimate:z.2f} JOD"
+            )
             + (", on the front" if row.front else "")
             for row in table.itertuples()
         ),
@@ -424,11 +586,26 @@ def _objective(table: pd.DataFrame, about: str, codebook: Codebook) -> Figure:
                 ax.plot([row.value] * 2, [row.low, row.high], color=BLUE, linewidth=1.2)
             ax.plot(row.value, row.estimate, "o", color=BLUE, markersize=4.5)
             if row.front:
-                ax.plot(row.value, row.estimate, "o", markerfacecolor="none", markeredgecolor=ORANGE, markersize=9)
+                ax.plot(
+                    row.value,
+                    row.estimate,
+                    "o",
+                    markerfacecolor="none",
+                    markeredgecolor=ORANGE,
+                    markersize=9,
+                )
         labelled = here.sort_values("estimate")
-        for row, y in zip(labelled.itertuples(), _apart(labelled.estimate.to_numpy(), 0.085 * tall), strict=True):
+        for row, y in zip(
+            labelled.itertuples(), _apart(labelled.estimate.to_numpy(), 0.085 * tall), strict=True
+        ):
             ax.plot([row.value, end], [row.estimate, y], color="#999999", linewidth=0.5, zorder=0)
-            ax.text(end + 0.02 * room, y, figures._cut(codebook.label(row.technique), 14), va="center_baseline", size=7)
+            ax.text(
+                end + 0.02 * room,
+                y,
+                figures._cut(codebook.label(row.technique), 14),
+                va="center_baseline",
+                size=7,
+            )
         ax.axhline(0, color="#888888", linewidth=0.7, zorder=0)
         ax.set_title(figures._cut(framing_label(codebook, framing), 24), loc="left")
         ax.set_xlim(-0.04 * room, 1.62 * room)
@@ -440,18 +617,34 @@ def _objective(table: pd.DataFrame, about: str, codebook: Codebook) -> Figure:
     return figure
 
 
-def draw_power(curves: pd.DataFrame, wanted: float, difference: float, correction: str, codebook: Codebook) -> Picture:
-    """Power against people: one row a goal, one panel a design. curves: one framing and correction of `power.plan_table`."""
+def draw_power(
+    curves: pd.DataFrame, wanted: float, difference: float, correction: str, codebook: Codebook
+) -> Picture:
+    """Power against people: one row a goal, one panel a design. curves: one framing and correction
+    of `power.plan_table`.
+    """
     return figures._picture(
         "power",
         f"How many people find, or exclude, {difference:g} JOD",
-        f"Share of simulated studies that reach the goal; the dashed line is the wanted power, {wanted:g}; bands are 95 % intervals of "
+        "Share of simulated studies that reach the goal; the dashed line is the wanted "
+        f"power, {wanted:g}; bands are 95 % intervals of "
         "the simulation, dots the closed form where there is one"
-        + ("." if correction == "none" else "; each test at Holm's first step for the whole family.")
-        + ("" if set(curves.framing) == {"any"} else f" Worths of {codebook.framing_label(curves.framing.iloc[0])}."),
+        + (
+            "."
+            if correction == "none"
+            else "; each test at Holm's first step for the whole family."
+        )
+        + (
+            ""
+            if set(curves.framing) == {"any"}
+            else f" Worths of {codebook.framing_label(curves.framing.iloc[0])}."
+        ),
         "; ".join(
             f"{goal}, {design}, {test}: "
-            + ", ".join(f"{row.people} people {row.power:.2f}" for row in rows.iloc[:: max(1, len(rows) // 5)].itertuples())
+            + ", ".join(
+                f"{row.people} people {row.power:.2f}"
+                for row in rows.iloc[:: max(1, len(rows) // 5)].itertuples()
+            )
             for (goal, design, test), rows in curves.groupby(["goal", "design", "test"], sort=False)
         ),
         _power,
@@ -479,13 +672,21 @@ def _power(curves: pd.DataFrame, wanted: float, difference: float) -> Figure:
             ax = axes[row, column]
             ax.axhline(wanted, color=INK, linewidth=0.7, linestyle="--")
             for test, (_, colour, line) in TEST_STYLES.items():
-                here = curves[(curves.goal == goal) & (curves.design == design) & (curves.test == test)]
+                here = curves[
+                    (curves.goal == goal) & (curves.design == design) & (curves.test == test)
+                ]
                 if len(here):
-                    ax.fill_between(here.people, here.low, here.high, color=colour, alpha=0.15, linewidth=0)
+                    ax.fill_between(
+                        here.people, here.low, here.high, color=colour, alpha=0.15, linewidth=0
+                    )
                     ax.plot(here.people, here.power, line, color=colour, linewidth=1.5)
                     ax.plot(here.people, here.closed_form, "o", color=colour, markersize=2.4)
             ax.set_xscale("log")
-            ticks = [people for people in (5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000) if people <= curves.people.max()]
+            ticks = [
+                people
+                for people in (5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+                if people <= curves.people.max()
+            ]
             ax.set_xticks(ticks, [str(people) for people in ticks])
             ax.minorticks_off()
             ax.set_ylim(0, 1.02)
@@ -496,6 +697,11 @@ def _power(curves: pd.DataFrame, wanted: float, difference: float) -> Figure:
                 ax.set_xlabel("people")
     figure.supylabel("power", size=8)
     used = [test for test in TEST_STYLES if test in set(curves.test)]
-    keys = [Line2D([], [], color=TEST_STYLES[test][1], linestyle=TEST_STYLES[test][2], linewidth=1.5) for test in used]
-    figure.legend(keys, [TEST_STYLES[test][0] for test in used], loc="outside lower center", ncols=len(used))
+    keys = [
+        Line2D([], [], color=TEST_STYLES[test][1], linestyle=TEST_STYLES[test][2], linewidth=1.5)
+        for test in used
+    ]
+    figure.legend(
+        keys, [TEST_STYLES[test][0] for test in used], loc="outside lower center", ncols=len(used)
+    )
     return figure

@@ -30,7 +30,9 @@ def create_app(
     from app.study import Study
 
     study = Study.open(study_dir)
-    database = Database.open(database_url or study.database_url(simulated), study, simulated=simulated)
+    database = Database.open(
+        database_url or study.database_url(simulated), study, simulated=simulated
+    )
 
     app = Flask(
         "app",

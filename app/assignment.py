@@ -1,4 +1,6 @@
-"""Which participant sees what, in which order and on which side: drawn from the seed, written down, then obeyed."""
+"""Which participant sees what, in which order and on which side: drawn from the seed, written down,
+then obeyed.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ if TYPE_CHECKING:
 
 
 def assign(study: Study, participant: Participant) -> list[Trial]:
-    """The questions of a participant whose number is known; the same number and seed give the same list."""
+    """The questions of a participant whose number is known; the same number and seed give the same
+    list.
+    """
     from stimuli.design import trials
 
     return [

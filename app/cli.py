@@ -31,20 +31,26 @@ class LazyGroup(click.Group):
         return import_module(VERBS[name]).command if name in VERBS else None
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(package_name="subdermal", help="Show the version and end.")
-@click.option("--traceback", is_flag=True, help="Show where an error came from, not its one line alone.")
+@click.option(
+    "--traceback", is_flag=True, help="Show where an error came from, not its one line alone."
+)
 def cli(traceback: bool) -> None:
-    """Render skin with real-time subsurface scattering, ask people which picture looks more real, and
-    turn their answers into tables and figures."""
+    """Render skin with real-time subsurface scattering, ask people which picture looks more real,
+    and turn their answers into tables and figures.
+    """
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
-    What a user can cause is said in one line on stderr: 2 for bad usage and bad input (any exception
-    with an `exit_code`), 1 for a failing disk or network, 130 when interrupted. Anything else is a
-    defect and keeps its traceback.
+    What a user can cause is said in one line on stderr: 2 for bad usage and bad input (any
+    exception with an `exit_code`), 1 for a failing disk or network, 130 when interrupted. Anything
+    else is a defect and keeps its traceback.
     """
     args = sys.argv[1:] if args is None else list(args)
     try:

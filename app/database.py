@@ -1,4 +1,6 @@
-"""The connection to the database: durable, migrated at start-up, of one kind (real or simulated) for ever."""
+"""The connection to the database: durable, migrated at start-up, of one kind (real or simulated)
+for ever.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ BUSY_TIMEOUT_S = 30
 
 
 class Database:
-    """`with database.read() as session` sees one snapshot; `with database.write() as session` commits at its end.
+    """`with database.read() as session` sees one snapshot; `with database.write() as session`
+    commits at its end.
 
     A write is on the disk when its block has ended. Writers queue: none starts from a stale read.
     """
@@ -36,28 +39,45 @@ class Database:
 
     @classmethod
     def open(cls, url: str, study: Study, *, simulated: bool) -> Database:
-        """Connect, migrate to the newest schema and check that the database is this study's and of this kind."""
+        """Connect, migrate to the newest schema and check that the database is this study's and of
+        this kind.
+        """
         try:
             shown = make_url(url).render_as_string(hide_password=True)
         except ArgumentError:
-            raise InputError(f"--database: expected an SQLAlchemy URL such as sqlite:////data/study.sqlite3, got {url!r}") from None
+            raise InputError(
+                "--database: expected an SQLAlchemy URL such as "
+                f"sqlite:////data/study.sqlite3, got {url!r}"
+            ) from None
         try:
             engine = _engine(url)
             with engine.connect() as connection:
                 _migrate(connection)
         except (NoSuchModuleError, ModuleNotFoundError) as error:
-            raise InputError(f"{shown}: there is no driver for such a database here ({error})") from None
+            raise InputError(
+                f"{shown}: there is no driver for such a database here ({error})"
+            ) from None
         except DatabaseError as error:
-            raise InputError(f"{shown}: cannot be opened as a database ({str(error.orig).splitlines()[0]})") from None
+            raise InputError(
+                f"{shown}: cannot be opened as a database ({str(error.orig).splitlines()[0]})"
+            ) from None
         except CommandError as error:
-            raise InputError(f"{shown}: its schema is not one of this version of subdermal ({error})") from None
+            raise InputError(
+                f"{shown}: its schema is not one of this version of subdermal ({error})"
+            ) from None
         database = cls(engine)
         database._claim(study, "simulated" if simulated else "real", shown)
         return database
 
     def _claim(self, study: Study, kind: str, shown: str) -> None:
         """Record in a new database what it is about; refuse one that is about something else."""
-        expected = {"kind": kind, "name": study.name, "version": study.version, "seed": study.seed, "design": study.design}
+        expected = {
+            "kind": kind,
+            "name": study.name,
+            "version": study.version,
+            "seed": study.seed,
+            "design": study.design,
+        }
         with self.write() as session:
             record = session.get(StudyRecord, 1)
             if record is None:
@@ -65,7 +85,10 @@ class Database:
                 return
             for key, value in expected.items():
                 if (found := getattr(record, key)) != value:
-                    raise InputError(f"{shown}: holds answers of another study: {key} is {found!r}, expected {value!r}")
+                    raise InputError(
+                        f"{shown}: holds answers of another study: {key} is {found!r}, "
+                        f"expected {value!r}"
+                    )
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -108,7 +131,9 @@ def _configure_sqlite(connection, _record) -> None:
 
 
 def _begin_sqlite(connection) -> None:
-    """A writer takes the lock at once: upgrading a read lock later would fail where it should wait."""
+    """A writer takes the lock at once: upgrading a read lock later would fail where it should
+    wait.
+    """
     writes = connection.get_execution_options().get("writes", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 

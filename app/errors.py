@@ -1,4 +1,6 @@
-"""Errors that a user causes: one line that says what was wrong, what was got and what was expected."""
+"""Errors that a user causes: one line that says what was wrong, what was got and what was
+expected.
+"""
 
 
 class InputError(ValueError):

@@ -1,4 +1,5 @@
-"""The table of answers: one row an answer, written as it is read, with a codebook. Withdrawn answers are never in it.
+"""The table of answers: one row an answer, written as it is read, with a codebook. Withdrawn
+answers are never in it.
 
 One list describes the columns: the header, the rows and the codebook all come from it.
 """
@@ -35,7 +36,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of responses.csv: its name, type, unit or range, meaning, and how it comes out of a row."""
+    """A column of responses.csv: its name, type, unit or range, meaning, and how it comes out of a
+    row.
+    """
 
     name: str
     type: str
@@ -49,36 +52,188 @@ def _time(value: datetime) -> str:
 
 
 COLUMNS = (
-    Column("participant", "text", "P0001, P0002, ...", "Code of the participant, in the order of consent; says nothing about the person", lambda r: r.participant.code),
-    Column("familiarity", "integer", "1 to 5", "Self-rated familiarity with computer graphics: 1 the lowest, 5 the highest level", lambda r: r.participant.familiarity),
-    Column("framing", "text", "a framing of the study", "Distance at which both images of the question were taken", lambda r: r.trial.framing),
-    Column("left", "text", "a technique of the study", "Technique of the left (or upper) image, called A", lambda r: r.trial.left),
-    Column("right", "text", "a technique of the study", "Technique of the right (or lower) image, called B", lambda r: r.trial.right),
-    Column("answer", "integer", "-2 to 2", "Which looks more realistic: -2 clearly left, -1 slightly left, 0 no difference seen, 1 slightly right, 2 clearly right", lambda r: r.response.answer),
-    Column("order", "integer", "from 1", "Place of the question in this participant's random order", lambda r: r.trial.order),
-    Column("rt_ms", "integer", "ms", "Time from both images being on the screen to the confirmed answer; after a reload from the last showing (see timed_by, times_shown)", lambda r: r.response.rt_ms),
-    Column("started_at", "time", "ISO 8601, UTC", "When the question was first sent to the browser", lambda r: _time(r.response.started_at)),
-    Column("answered_at", "time", "ISO 8601, UTC", "When the answer was committed", lambda r: _time(r.response.answered_at)),
-    Column("timed_by", "text", "browser, server", "Clock of rt_ms: browser, or, without JavaScript, the server from sending the question to receiving the answer", lambda r: r.response.timed_by),
-    Column("times_shown", "integer", "from 1", "How often the question was sent to the browser; above 1 after a reload", lambda r: r.response.times_shown),
-    Column("completed", "integer", "0, 1", "Whether the participant answered every question", lambda r: int(r.participant.completed_at is not None)),
+    Column(
+        "participant",
+        "text",
+        "P0001, P0002, ...",
+        "Code of the participant, in the order of consent; says nothing about the person",
+        lambda r: r.participant.code,
+    ),
+    Column(
+        "familiarity",
+        "integer",
+        "1 to 5",
+        "Self-rated familiarity with computer graphics: 1 the lowest, 5 the highest level",
+        lambda r: r.participant.familiarity,
+    ),
+    Column(
+        "framing",
+        "text",
+        "a framing of the study",
+        "Distance at which both images of the question were taken",
+        lambda r: r.trial.framing,
+    ),
+    Column(
+        "left",
+        "text",
+        "a technique of the study",
+        "Technique of the left (or upper) image, called A",
+        lambda r: r.trial.left,
+    ),
+    Column(
+        "right",
+        "text",
+        "a technique of the study",
+        "Technique of the right (or lower) image, called B",
+        lambda r: r.trial.right,
+    ),
+    Column(
+        "answer",
+        "integer",
+        "-2 to 2",
+        (
+            "Which looks more realistic: -2 clearly left, -1 slightly left, 0 no difference "
+            "seen, 1 slightly right, 2 clearly right"
+        ),
+        lambda r: r.response.answer,
+    ),
+    Column(
+        "order",
+        "integer",
+        "from 1",
+        "Place of the question in this participant's random order",
+        lambda r: r.trial.order,
+    ),
+    Column(
+        "rt_ms",
+        "integer",
+        "ms",
+        (
+            "Time from both images being on the screen to the confirmed answer; after a reload "
+            "from the last showing (see timed_by, times_shown)"
+        ),
+        lambda r: r.response.rt_ms,
+    ),
+    Column(
+        "started_at",
+        "time",
+        "ISO 8601, UTC",
+        "When the question was first sent to the browser",
+        lambda r: _time(r.response.started_at),
+    ),
+    Column(
+        "answered_at",
+        "time",
+        "ISO 8601, UTC",
+        "When the answer was committed",
+        lambda r: _time(r.response.answered_at),
+    ),
+    Column(
+        "timed_by",
+        "text",
+        "browser, server",
+        (
+            "Clock of rt_ms: browser, or, without JavaScript, the server from sending the "
+            "question to receiving the answer"
+        ),
+        lambda r: r.response.timed_by,
+    ),
+    Column(
+        "times_shown",
+        "integer",
+        "from 1",
+        "How often the question was sent to the browser; above 1 after a reload",
+        lambda r: r.response.times_shown,
+    ),
+    Column(
+        "completed",
+        "integer",
+        "0, 1",
+        "Whether the participant answered every question",
+        lambda r: int(r.participant.completed_at is not None),
+    ),
     Column("study", "text", "", "Name of the study", lambda r: r.study.name),
     Column("study_version", "integer", "from 1", "Version of the study", lambda r: r.study.version),
-    Column("simulated", "integer", "0, 1", "1: a program gave the answer, 0: a person did. Never both in one table", lambda r: int(r.simulated)),
-    Column("seed", "text", "study seed/number", "What the participant's order and sides were drawn from: the seed of the study and the participant's number", lambda r: r.trial.seed),
-    Column("image_left_sha256", "text", "64 hexadecimal digits", "SHA-256 of the file of the left image, as in manifest.json", lambda r: r.response.image_left_sha256),
-    Column("image_right_sha256", "text", "64 hexadecimal digits", "SHA-256 of the file of the right image, as in manifest.json", lambda r: r.response.image_right_sha256),
-    Column("viewport_width", "integer", "CSS pixels", "Width of the inside of the browser's window; empty without JavaScript", lambda r: r.response.viewport_width),
-    Column("viewport_height", "integer", "CSS pixels", "Height of the inside of the browser's window; empty without JavaScript", lambda r: r.response.viewport_height),
-    Column("device_pixel_ratio", "number", "physical pixels a CSS pixel", "Display scaling times zoom; empty without JavaScript", lambda r: r.response.device_pixel_ratio),
-    Column("shown_width", "number", "CSS pixels", "Width of each image as shown; times device_pixel_ratio it is physical pixels; empty without JavaScript", lambda r: r.response.shown_width),
-    Column("shown_height", "number", "CSS pixels", "Height of each image as shown; times device_pixel_ratio it is physical pixels; empty without JavaScript", lambda r: r.response.shown_height),
+    Column(
+        "simulated",
+        "integer",
+        "0, 1",
+        "1: a program gave the answer, 0: a person did. Never both in one table",
+        lambda r: int(r.simulated),
+    ),
+    Column(
+        "seed",
+        "text",
+        "study seed/number",
+        (
+            "What the participant's order and sides were drawn from: the seed of the study and "
+            "the participant's number"
+        ),
+        lambda r: r.trial.seed,
+    ),
+    Column(
+        "image_left_sha256",
+        "text",
+        "64 hexadecimal digits",
+        "SHA-256 of the file of the left image, as in manifest.json",
+        lambda r: r.response.image_left_sha256,
+    ),
+    Column(
+        "image_right_sha256",
+        "text",
+        "64 hexadecimal digits",
+        "SHA-256 of the file of the right image, as in manifest.json",
+        lambda r: r.response.image_right_sha256,
+    ),
+    Column(
+        "viewport_width",
+        "integer",
+        "CSS pixels",
+        "Width of the inside of the browser's window; empty without JavaScript",
+        lambda r: r.response.viewport_width,
+    ),
+    Column(
+        "viewport_height",
+        "integer",
+        "CSS pixels",
+        "Height of the inside of the browser's window; empty without JavaScript",
+        lambda r: r.response.viewport_height,
+    ),
+    Column(
+        "device_pixel_ratio",
+        "number",
+        "physical pixels a CSS pixel",
+        "Display scaling times zoom; empty without JavaScript",
+        lambda r: r.response.device_pixel_ratio,
+    ),
+    Column(
+        "shown_width",
+        "number",
+        "CSS pixels",
+        (
+            "Width of each image as shown; times device_pixel_ratio it is physical pixels; empty "
+            "without JavaScript"
+        ),
+        lambda r: r.response.shown_width,
+    ),
+    Column(
+        "shown_height",
+        "number",
+        "CSS pixels",
+        (
+            "Height of each image as shown; times device_pixel_ratio it is physical pixels; "
+            "empty without JavaScript"
+        ),
+        lambda r: r.response.shown_height,
+    ),
 )
 NAMES = tuple(column.name for column in COLUMNS)
 
 
 def counted(*columns: Any) -> Select:
-    """`select(*columns)` over the answers that count: committed, of participants who did not withdraw."""
+    """`select(*columns)` over the answers that count: committed, of participants who did not
+    withdraw.
+    """
     return (
         select(*columns)
         .select_from(Response)
@@ -96,7 +251,9 @@ def count(session: Session) -> int:
 def records(session: Session, study: Study, *, simulated: bool) -> Iterator[dict[str, Any]]:
     """The rows of the table, by participant and order, as mappings."""
     query = counted(Participant, Trial, Response).order_by(Participant.id, Trial.order)
-    for participant, trial, response in session.execute(query.execution_options(yield_per=CHUNK_ROWS)):
+    for participant, trial, response in session.execute(
+        query.execution_options(yield_per=CHUNK_ROWS)
+    ):
         row = Row(study, simulated, participant, trial, response)
         yield {column.name: column.value(row) for column in COLUMNS}
 
@@ -108,7 +265,10 @@ def responses_csv(session: Session, study: Study, *, simulated: bool) -> Iterato
 
 def codebook_csv() -> Iterator[str]:
     """codebook.csv: a row for each column of responses.csv."""
-    return _csv(("column", "type", "values", "description"), ((c.name, c.type, c.values, c.description) for c in COLUMNS))
+    return _csv(
+        ("column", "type", "values", "description"),
+        ((c.name, c.type, c.values, c.description) for c in COLUMNS),
+    )
 
 
 def codebook_md(study: Study, *, simulated: bool) -> str:
@@ -117,7 +277,12 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
     lines = [
         f"# Codebook of {asked.title} ({asked.name}, version {asked.version})",
         "",
-        "One row of `responses.csv` is one answer. " + ("**All answers are simulated.**" if simulated else "Answers that were withdrawn are not in it."),
+        "One row of `responses.csv` is one answer. "
+        + (
+            "**All answers are simulated.**"
+            if simulated
+            else "Answers that were withdrawn are not in it."
+        ),
         "",
         "| column | type | values | description |",
         "|---|---|---|---|",
@@ -131,13 +296,18 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
         "",
         f"Familiarity: {asked.familiarity.question}",
         "",
-        *(f"- familiarity {value}: {label}" for value, label in enumerate(asked.familiarity.labels, start=1)),
+        *(
+            f"- familiarity {value}: {label}"
+            for value, label in enumerate(asked.familiarity.labels, start=1)
+        ),
     ]
     return "\n".join(lines) + "\n"
 
 
 def write(directory: Path, session: Session, study: Study, *, simulated: bool) -> int:
-    """Write responses.csv and the codebooks into a folder, each whole or not at all; the number of answers."""
+    """Write responses.csv and the codebooks into a folder, each whole or not at all; the number of
+    answers.
+    """
     directory.mkdir(parents=True, exist_ok=True)
     _replace(directory / "codebook.csv", codebook_csv())
     _replace(directory / "codebook.md", [codebook_md(study, simulated=simulated)])

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from sqlalchemy import BigInteger, CheckConstraint, DateTime, Double, ForeignKey, Index, MetaData, String, UniqueConstraint
+from sqlalchemy import (
+    BigInteger,
+    CheckConstraint,
+    DateTime,
+    Double,
+    ForeignKey,
+    Index,
+    MetaData,
+    String,
+    UniqueConstraint,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 from sqlalchemy.types import TypeDecorator
 
@@ -54,11 +64,16 @@ class StudyRecord(Base):
     seed: Mapped[int] = mapped_column(BigInteger)
     design: Mapped[str]  # JSON: the names of framings and techniques, in the order of the study
     secret_key: Mapped[str] = mapped_column(String(64))  # signs the cookies
-    password_hash: Mapped[str | None] = mapped_column(String(255))  # scrypt; None: nobody can log in yet
+    password_hash: Mapped[str | None] = mapped_column(
+        String(255)
+    )  # scrypt; None: nobody can log in yet
     simulation_seed: Mapped[int | None] = mapped_column(BigInteger)
     created_at: Mapped[datetime] = mapped_column(default=now)
 
-    __table_args__ = (CheckConstraint("kind IN ('real', 'simulated')", name="kind"), CheckConstraint("id = 1", name="one_row"))
+    __table_args__ = (
+        CheckConstraint("kind IN ('real', 'simulated')", name="kind"),
+        CheckConstraint("id = 1", name="one_row"),
+    )
 
 
 class Participant(Base):
@@ -95,14 +110,19 @@ class Trial(Base):
     framing: Mapped[str] = mapped_column(String(100))
     left: Mapped[str] = mapped_column(String(100))
     right: Mapped[str] = mapped_column(String(100))
-    seed: Mapped[str] = mapped_column(String(50))  # "study seed/participant": what the design was drawn from
+    seed: Mapped[str] = mapped_column(
+        String(50)
+    )  # "study seed/participant": what the design was drawn from
 
     participant: Mapped[Participant] = relationship(back_populates="trials")
     response: Mapped[Response | None] = relationship(back_populates="trial")
 
 
 class Response(Base):
-    """One committed answer. Sizes are in CSS pixels; times the device pixel ratio they are physical ones."""
+    """One committed answer.
+
+    Sizes are in CSS pixels; times the device pixel ratio they are physical ones.
+    """
 
     __tablename__ = "responses"
     __table_args__ = (
@@ -132,7 +152,9 @@ class Response(Base):
 
 
 class Event(Base):
-    """What happened to a participant and when: consented, rated, shown, refused, completed, withdrew."""
+    """What happened to a participant and when: consented, rated, shown, refused, completed,
+    withdrew.
+    """
 
     __tablename__ = "events"
 

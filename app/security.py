@@ -1,7 +1,8 @@
-"""What keeps the pages safe: signed cookies, CSRF tokens, response headers. No address or user agent is stored.
+"""What keeps the pages safe: signed cookies, CSRF tokens, response headers. No address or user
+agent is stored.
 
-The content policy allows files of this server only, nothing inline; a page that needs another policy
-(the report) sets its own, and it is left as it is.
+The content policy allows files of this server only, nothing inline; a page that needs another
+policy (the report) sets its own, and it is left as it is.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ REPORT_POLICY = "; ".join(
         "frame-ancestors 'none'",
     )
 )
-#: A participant may come back to withdraw within this time from the same browser (later by the completion code).
+#: A participant may come back to withdraw within this time from the same browser (later by the
+#: completion code).
 COOKIE_LIFETIME = timedelta(days=60)
 
 
@@ -51,7 +53,8 @@ class _Sessions(SecureCookieSessionInterface):
 
 
 class Limiter:
-    """At most `attempts` within `window_s` seconds for a key, and ten times that for all keys together.
+    """At most `attempts` within `window_s` seconds for a key, and ten times that for all keys
+    together.
 
     Kept in memory alone: the keys may be addresses, which are never stored.
     """
@@ -88,12 +91,14 @@ def init(app: Flask) -> None:
     app.config.update(
         SECRET_KEY=record.secret_key,
         STUDY_KIND=record.kind,
-        PASSWORD_HASH=None,  # the one in the database; `serve` gives a simulated study that of the real one
+        # the one in the database; `serve` gives a simulated study that of the real one
+        PASSWORD_HASH=None,
         SESSION_COOKIE_NAME="subdermal" if record.kind == "real" else f"subdermal_{record.kind}",
         SESSION_COOKIE_HTTPONLY=True,
         SESSION_COOKIE_SAMESITE="Lax",
         PERMANENT_SESSION_LIFETIME=COOKIE_LIFETIME,
-        WTF_CSRF_TIME_LIMIT=None,  # a question may stay open for hours: the token lives as long as the cookie
+        # a question may stay open for hours: the token lives as long as the cookie
+        WTF_CSRF_TIME_LIMIT=None,
         MAX_CONTENT_LENGTH=64 * 1024,
     )
     app.session_interface = _Sessions()
@@ -111,5 +116,7 @@ def _headers(response: Response) -> Response:
     headers["Cross-Origin-Resource-Policy"] = "same-origin"
     headers["Permissions-Policy"] = "camera=(), geolocation=(), microphone=()"
     if "Cache-Control" not in headers:
-        headers["Cache-Control"] = "no-store"  # the server owns the position: no page is shown from a cache
+        headers["Cache-Control"] = (
+            "no-store"  # the server owns the position: no page is shown from a cache
+        )
     return response

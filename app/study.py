@@ -53,7 +53,9 @@ class Study:
 
     @cached_property
     def design(self) -> str:
-        """The names, in the order of the study: what must stay for answers to belong together (JSON)."""
+        """The names, in the order of the study: what must stay for answers to belong together
+        (JSON).
+        """
         return json.dumps({"framings": self.framings, "techniques": self.techniques})
 
     @cached_property
@@ -64,7 +66,9 @@ class Study:
         return self.manifest.image(framing, technique)
 
     def database_url(self, simulated: bool) -> str:
-        return f"sqlite:///{self.directory / ('simulated.sqlite3' if simulated else 'study.sqlite3')}"
+        return (
+            f"sqlite:///{self.directory / ('simulated.sqlite3' if simulated else 'study.sqlite3')}"
+        )
 
     def report(self, simulated: bool) -> Path:
         """Where the report on the answers of this kind is looked for."""

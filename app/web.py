@@ -1,4 +1,6 @@
-"""What every page shares: names for the templates, the images of the study, friendly error pages."""
+"""What every page shares: names for the templates, the images of the study,
+friendly error pages.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,17 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
-from flask import Blueprint, Flask, Response, abort, current_app, jsonify, render_template, request, send_file
+from flask import (
+    Blueprint,
+    Flask,
+    Response,
+    abort,
+    current_app,
+    jsonify,
+    render_template,
+    request,
+    send_file,
+)
 from flask_wtf.csrf import CSRFError
 from werkzeug.exceptions import HTTPException
 
@@ -36,7 +48,9 @@ def simulated() -> bool:
 
 def wants_json() -> bool:
     """Whether the page's script asks, and not a form or an address bar."""
-    return request.accept_mimetypes.best_match(["text/html", "application/json"]) == "application/json"
+    return (
+        request.accept_mimetypes.best_match(["text/html", "application/json"]) == "application/json"
+    )
 
 
 def init(app: Flask) -> None:
@@ -47,7 +61,9 @@ def init(app: Flask) -> None:
 
 @blueprint.get("/images/<sha256>")
 def image(sha256: str) -> Response:
-    """An image of the study by the hash of its bytes; other bytes are never sent under that address."""
+    """An image of the study by the hash of its bytes; other bytes are never sent under that
+    address.
+    """
     found = study().images_by_sha256.get(sha256)
     if found is None:
         abort(404, "This study has no such image.")
@@ -70,8 +86,13 @@ def _digest(path: Path, _mtime_ns: int, _size: int) -> str:
 def style() -> Response:
     """The aspect ratio of each framing's images (the content policy allows no inline styles)."""
     definition = study()
-    images = [definition.image(framing, definition.techniques[0]) for framing in definition.framings]
-    rules = (f'[data-framing="{i}"] {{ --ratio: {image.width / image.height:.6f}; }}\n' for i, image in enumerate(images))
+    images = [
+        definition.image(framing, definition.techniques[0]) for framing in definition.framings
+    ]
+    rules = (
+        f'[data-framing="{i}"] {{ --ratio: {image.width / image.height:.6f}; }}\n'
+        for i, image in enumerate(images)
+    )
     response = Response("".join(rules), mimetype="text/css")
     response.headers["Cache-Control"] = "no-cache"
     return response
@@ -80,7 +101,10 @@ def style() -> Response:
 def _error_page(error: HTTPException):
     message = error.description
     if isinstance(error, CSRFError):
-        message = "The page was too old, or your browser keeps no cookies. Allow cookies for this site, reload and try again."
+        message = (
+            "The page was too old, or your browser keeps no cookies. Allow cookies for "
+            "this site, reload and try again."
+        )
     if wants_json():
         return jsonify(error=message), error.code
     response = error.get_response()

@@ -1,15 +1,16 @@
-"""Photons per second against a plain C loop in the manner of MCML, compiled in the same run; scaling with threads; memory.
+"""Photons per second against a plain C loop in the manner of MCML, compiled in the same run;
+scaling with threads; memory.
 
-Each round runs C and ours in turn, so that drift hits both alike; medians of CPU and wall seconds, and their ratio. C gets
-the same photons and layers and counts the same curves with the optimisation that its compiler has for this processor. Without a
-C compiler the yardstick is mcml_loop(), the same plain loop through numba. Both must agree in what they computed.
+Each round runs C and ours in turn, so that drift hits both alike; medians of CPU and wall seconds,
+and their ratio. C gets the same photons and layers and counts the same curves with the optimisation
+that its compiler has for this processor. Without a C compiler the yardstick is mcml_loop(), the
+same plain loop through numba. Both must agree in what they computed.
 """
 
 from __future__ import annotations
 
 import math
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -24,17 +25,23 @@ from renderer.profiles.montecarlo import Layer, Result, simulate
 
 ROUNDS = 5
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math"]
-CASES = {  # the first three are MCML's own samples and checks, the last is near what skin does to red light
+# the first three are MCML's own samples and checks, the last is near what skin does to red light
+CASES = {
     "slab, g .75, tau 2": (2_000_000, [Layer(1, 1, 9, 0.75, 0.2)]),
     "half-space, n 1.5, g 0": (1_000_000, [Layer(1.5, 1, 9)]),
-    "three layers, n 1.37": (500_000, [Layer(1.37, 0.1, 10, 0.9, 1), Layer(1.37, 0.1, 1, 0, 1), Layer(1.37, 0.2, 1, 0.7, 2)]),
+    "three layers, n 1.37": (
+        500_000,
+        [Layer(1.37, 0.1, 10, 0.9, 1), Layer(1.37, 0.1, 1, 0, 1), Layer(1.37, 0.2, 1, 0.7, 2)],
+    ),
     "half-space, n 1.4, g .9, albedo .998": (100_000, [Layer(1.4, 0.02, 10, 0.9)]),
 }
 
 
 @numba.njit(cache=True, error_model="numpy")
-def mcml_loop(photons, seed, n, z, mu_a, mu_t, g):  # noqa: PLR0915
-    """What mcml.c does, for where there is no C compiler: (diffuse reflectance, transmittance, absorbed)."""
+def mcml_loop(photons, seed, n, z, mu_a, mu_t, g):
+    """What mcml.c does, for where there is no C compiler: (diffuse reflectance, transmittance,
+    absorbed).
+    """
     np.random.seed(seed)
     R = T = A = 0.0
     layers = len(mu_t)
@@ -57,7 +64,10 @@ def mcml_loop(photons, seed, n, z, mu_a, mu_t, g):  # noqa: PLR0915
                 f, cos2 = 1.0, 0.0
                 if sin2 < 1:
                     cos1, cos2 = abs(uz), math.sqrt(1 - sin2 * sin2)
-                    s, p = (ratio * cos1 - cos2) / (ratio * cos1 + cos2), (cos1 - ratio * cos2) / (cos1 + ratio * cos2)
+                    s, p = (
+                        (ratio * cos1 - cos2) / (ratio * cos1 + cos2),
+                        (cos1 - ratio * cos2) / (cos1 + ratio * cos2),
+                    )
                     f = 0.5 * (s * s + p * p)
                 if np.random.random() < f:
                     uz = -uz
@@ -82,8 +92,11 @@ def mcml_loop(photons, seed, n, z, mu_a, mu_t, g):  # noqa: PLR0915
                 ux, uy, uz = sint * cosp, sint * sinp, math.copysign(cost, uz * cost)
             else:
                 t = math.sqrt(1 - uz * uz)
-                ux, uy, uz = (sint * (ux * uz * cosp - uy * sinp) / t + ux * cost,
-                              sint * (uy * uz * cosp + ux * sinp) / t + uy * cost, -sint * cosp * t + uz * cost)
+                ux, uy, uz = (
+                    sint * (ux * uz * cosp - uy * sinp) / t + ux * cost,
+                    sint * (uy * uz * cosp + ux * sinp) / t + uy * cost,
+                    -sint * cosp * t + uz * cost,
+                )
             if w < 1e-4:
                 if w == 0 or np.random.random() > 0.1:
                     break
@@ -92,15 +105,30 @@ def mcml_loop(photons, seed, n, z, mu_a, mu_t, g):  # noqa: PLR0915
 
 
 def yardstick(folder: Path):
-    """(its name, run(photons, seed, layers) -> wall s, CPU s, diffuse reflectance, transmittance)."""
+    """(its name, run(photons, seed, layers) -> wall s, CPU s, diffuse reflectance,
+    transmittance).
+    """
     if compiler := shutil.which("cc"):
         program = folder / "mcml"
-        subprocess.run([compiler, *FLAGS, "-o", program, Path(__file__).with_name("mcml.c"), "-lm"], check=True)
-        version = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+        subprocess.run(
+            [compiler, *FLAGS, "-o", program, Path(__file__).with_name("mcml.c"), "-lm"], check=True
+        )
+        version = subprocess.run(
+            [compiler, "--version"], capture_output=True, text=True, check=True
+        ).stdout.splitlines()[0]
 
         def run(photons, seed, layers):
-            words = [str(value) for layer in layers for value in (layer.n, layer.mu_a, layer.mu_s, layer.g, layer.d)]
-            out = subprocess.run([program, str(photons), str(seed), "1", "1", *words], capture_output=True, text=True, check=True)
+            words = [
+                str(value)
+                for layer in layers
+                for value in (layer.n, layer.mu_a, layer.mu_s, layer.g, layer.d)
+            ]
+            out = subprocess.run(
+                [program, str(photons), str(seed), "1", "1", *words],
+                capture_output=True,
+                text=True,
+                check=True,
+            )
             wall, cpu, _, R, T, _ = map(float, out.stdout.split())
             return wall, cpu, R, T
 
@@ -109,7 +137,10 @@ def yardstick(folder: Path):
     def run(photons, seed, layers):
         n = np.array([1.0, *(layer.n for layer in layers), 1.0])
         z = np.concatenate([[0.0], np.cumsum([layer.d for layer in layers])])
-        columns = [np.array([getattr(layer, name) for layer in layers], dtype=float) for name in ("mu_a", "mu_t", "g")]
+        columns = [
+            np.array([getattr(layer, name) for layer in layers], dtype=float)
+            for name in ("mu_a", "mu_t", "g")
+        ]
         mcml_loop(10, seed, n, z, *columns)
         wall, cpu = time.perf_counter(), time.process_time()
         R, T, _ = mcml_loop(photons, seed, n, z, *columns)
@@ -129,24 +160,48 @@ def speed() -> None:
     ours(1000, 0, [Layer(1.4, 1, 9)], 1)  # compiles
     with tempfile.TemporaryDirectory() as folder:
         name, plain = yardstick(Path(folder))
-        print(f"yardstick: {name}; {ROUNDS} rounds in turn, medians; million photons a second on one thread, then on {cores}")
-        print(f"wall x: how much faster all threads are; CPU x: what more they cost (1: nothing is lost, so idle cores scale); load {os.getloadavg()[0]:.1f}")
-        print(f"{'case':<38}{'plain CPU':>10}{'ours CPU':>10}{'ratio':>7}{'plain wall':>12}{'ours wall':>11}{f'{cores} threads':>11}{'wall x':>8}{'CPU x':>7}  off")
+        print(
+            f"yardstick: {name}; {ROUNDS} rounds in turn, medians; million photons a second "
+            f"on one thread, then on {cores}"
+        )
+        print(
+            "wall x: how much faster all threads are; CPU x: what more they cost (1: nothing "
+            f"is lost, so idle cores scale); load {os.getloadavg()[0]:.1f}"
+        )
+        print(
+            f"{'case':<38}{'plain CPU':>10}{'ours CPU':>10}{'ratio':>7}{'plain wall':>12}"
+            f"{'ours wall':>11}{f'{cores} threads':>11}{'wall x':>8}{'CPU x':>7}  off"
+        )
         for case, (photons, layers) in CASES.items():
             rows, shares = [], []
             for round_ in range(ROUNDS):
-                wall, cpu, R, T = plain(photons, round_, layers)
+                wall, cpu, R, _T = plain(photons, round_, layers)
                 one = ours(photons, round_, layers, 1)
                 many = ours(photons, round_, layers, cores)
                 rows.append((cpu, one[1], wall, one[0], many[0], many[1]))
-                shares.append((R - one[2].diffuse_reflectance - (one[2].specular - _first(layers)), one[2].diffuse_reflectance_error))
+                shares.append(
+                    (
+                        R - one[2].diffuse_reflectance - (one[2].specular - _first(layers)),
+                        one[2].diffuse_reflectance_error,
+                    )
+                )
             # The yardstick has about our error; the mean of all rounds must agree.
-            off = np.mean([d for d, _ in shares]) / (np.sqrt(2 / ROUNDS) * np.mean([e for _, e in shares]))
-            plain_cpu, our_cpu, plain_wall, our_wall, all_wall, all_cpu = photons / 1e6 / np.median(np.array(rows), axis=0)
-            print(f"{case:<38}{plain_cpu:>10.3f}{our_cpu:>10.3f}{our_cpu / plain_cpu:>7.2f}{plain_wall:>12.3f}{our_wall:>11.3f}{all_wall:>11.3f}"
-                  f"{all_wall / our_wall:>8.2f}{our_cpu / all_cpu:>7.2f}  {off:+.1f} sigma", flush=True)
+            off = np.mean([d for d, _ in shares]) / (
+                np.sqrt(2 / ROUNDS) * np.mean([e for _, e in shares])
+            )
+            plain_cpu, our_cpu, plain_wall, our_wall, all_wall, all_cpu = (
+                photons / 1e6 / np.median(np.array(rows), axis=0)
+            )
+            print(
+                f"{case:<38}{plain_cpu:>10.3f}{our_cpu:>10.3f}{our_cpu / plain_cpu:>7.2f}"
+                f"{plain_wall:>12.3f}{our_wall:>11.3f}{all_wall:>11.3f}"
+                f"{all_wall / our_wall:>8.2f}{our_cpu / all_cpu:>7.2f}  {off:+.1f} sigma",
+                flush=True,
+            )
             if abs(off) > 4:
-                sys.exit(f"photons: {case}: the yardstick and ours disagree by {off:.1f} standard errors")
+                sys.exit(
+                    f"photons: {case}: the yardstick and ours disagree by {off:.1f} standard errors"
+                )
 
 
 def _first(layers: list[Layer]) -> float:
@@ -157,11 +212,20 @@ def _first(layers: list[Layer]) -> float:
 def memory() -> None:
     """Peak memory of a process of its own for each number of photons."""
     print("\nphotons      peak memory MB")
-    program = "import sys, resource; from renderer.profiles.montecarlo import *; simulate([Layer(1.5, 1, 9)], int(sys.argv[1]), cache=False); " \
-              "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    program = (
+        "import sys, resource; from renderer.profiles.montecarlo import *; "
+        "simulate([Layer(1.5, 1, 9)], int(sys.argv[1]), cache=False); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
     for photons in (10_000, 100_000, 1_000_000, 10_000_000):
-        out = subprocess.run([sys.executable, "-c", program, str(photons)], capture_output=True, text=True, check=True)
-        print(f"{photons:<13}{int(out.stdout) / (1024 * 1024 if sys.platform == 'darwin' else 1024):>8.0f}")
+        out = subprocess.run(
+            [sys.executable, "-c", program, str(photons)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        per_mb = 1024 * 1024 if sys.platform == "darwin" else 1024
+        print(f"{photons:<13}{int(out.stdout) / per_mb:>8.0f}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
-"""What each technique costs: scattering alone, over the same shared buffers, in turn, so that drift hits all alike.
+"""What each technique costs: scattering alone, over the same shared buffers, in turn, so that drift
+hits all alike.
 
-Prints median wall and CPU milliseconds of one 1920x1080 frame at 2x2 supersampling, their ratio to golubev within this
-run, samples per scattering pixel, and what the techniques share. Software OpenGL is a processor's work: compare ratios.
+Prints median wall and CPU milliseconds of one 1920x1080 frame at 2x2 supersampling, their ratio to
+golubev within this run, samples per scattering pixel, and what the techniques share. Software
+OpenGL is a processor's work: compare ratios.
 """
 
 from __future__ import annotations
@@ -23,7 +25,10 @@ def main() -> None:
     head = load_head()
     loaded = time.perf_counter() - start[0], time.process_time() - start[1]
     with renderer.Renderer(head.model) as drawing:
-        print(f"{drawing.info()['gl_renderer']}, 1920x1080, 2x2 supersampling, {ROUNDS} rounds in turn, medians")
+        print(
+            f"{drawing.info()['gl_renderer']}, 1920x1080, 2x2 supersampling, {ROUNDS} rounds "
+            "in turn, medians"
+        )
         print(f"head: {loaded[0]:.1f} s wall, {loaded[1]:.1f} s CPU")
         for framing in renderer.FRAMINGS:
             start = time.perf_counter(), time.process_time()
@@ -33,12 +38,25 @@ def main() -> None:
             for name, technique in techniques.items():
                 counts = frame.render(technique).samples
                 samples[name] = counts[counts > 0].mean()
-            median = {name: np.median(spent, axis=0) for name, spent in frame.time(techniques, ROUNDS).items()}
+            median = {
+                name: np.median(spent, axis=0)
+                for name, spent in frame.time(techniques, ROUNDS).items()
+            }
             frame.close()
-            print(f"\n{framing}: shared passes {shared[0]:.1f} s wall, {shared[1]:.1f} s CPU (once a framing)")
-            print(f"{'technique':<18}{'wall ms':>9}{'CPU ms':>9}{'wall/golubev':>14}{'CPU/golubev':>13}{'samples':>9}")
+            print(
+                f"\n{framing}: shared passes {shared[0]:.1f} s wall, {shared[1]:.1f} s CPU "
+                "(once a framing)"
+            )
+            print(
+                f"{'technique':<18}{'wall ms':>9}{'CPU ms':>9}{'wall/golubev':>14}"
+                f"{'CPU/golubev':>13}{'samples':>9}"
+            )
             for name, (wall, cpu) in median.items():
-                print(f"{name:<18}{1e3 * wall:>9.0f}{1e3 * cpu:>9.0f}{wall / median['golubev'][0]:>14.2f}{cpu / median['golubev'][1]:>13.2f}{samples[name]:>9.2f}")
+                print(
+                    f"{name:<18}{1e3 * wall:>9.0f}{1e3 * cpu:>9.0f}"
+                    f"{wall / median['golubev'][0]:>14.2f}{cpu / median['golubev'][1]:>13.2f}"
+                    f"{samples[name]:>9.2f}"
+                )
     print(f"\npeak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
 
 

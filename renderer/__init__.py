@@ -14,8 +14,12 @@ if sys.platform == "linux":
     os.environ.setdefault("PYGLET_HEADLESS", "true")
 
 VERSION = "0.1.0"
-_WHERE = {"Renderer": "renderer.frame", "TECHNIQUES": "renderer.techniques", "make": "renderer.techniques",
-          "FRAMINGS": "renderer.scene"}
+_WHERE = {
+    "Renderer": "renderer.frame",
+    "TECHNIQUES": "renderer.techniques",
+    "make": "renderer.techniques",
+    "FRAMINGS": "renderer.scene",
+}
 
 
 def __getattr__(name: str):

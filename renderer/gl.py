@@ -12,15 +12,17 @@ from pathlib import Path
 
 os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
 
-import numpy as np  # noqa: E402
-from OpenGL import GL  # noqa: E402
+import numpy as np
+from OpenGL import GL
 
-from renderer.errors import InputError  # noqa: E402
+from renderer.errors import InputError
 
 ROOT = Path(__file__).parent
 PLATFORMS = ("egl", "osmesa")
 _FORMATS = {  # internal format -> (format, channels)
-    GL.GL_RGBA32F: (GL.GL_RGBA, 4), GL.GL_RGBA16F: (GL.GL_RGBA, 4), GL.GL_R32F: (GL.GL_RED, 1),
+    GL.GL_RGBA32F: (GL.GL_RGBA, 4),
+    GL.GL_RGBA16F: (GL.GL_RGBA, 4),
+    GL.GL_R32F: (GL.GL_RED, 1),
     GL.GL_RGBA8: (GL.GL_RGBA, 4),
 }
 
@@ -31,13 +33,17 @@ class Context:
     def __init__(self):
         name = os.environ["PYOPENGL_PLATFORM"]
         if name not in PLATFORMS:
-            raise InputError(f"PYOPENGL_PLATFORM is {name!r}; expected one of {', '.join(PLATFORMS)}")
+            raise InputError(
+                f"PYOPENGL_PLATFORM is {name!r}; expected one of {', '.join(PLATFORMS)}"
+            )
         self.name = name
         try:
             if name == "egl":
                 from pyrender.platforms.egl import EGLPlatform, get_device_by_index
 
-                self._platform = EGLPlatform(16, 16, device=get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", 0))))
+                self._platform = EGLPlatform(
+                    16, 16, device=get_device_by_index(int(os.environ.get("EGL_DEVICE_ID", 0)))
+                )
             else:
                 from pyrender.platforms.osmesa import OSMesaPlatform
 
@@ -45,11 +51,19 @@ class Context:
             self._platform.init_context()
             self._platform.make_current()
         except Exception as error:  # the platforms raise whatever their loader raised
-            raise InputError(f"no OpenGL context through {name}: {type(error).__name__} {error}; "
-                             "expected Mesa's libegl1 and libgl1-mesa-dri, or libosmesa6") from error
+            raise InputError(
+                f"no OpenGL context through {name}: {type(error).__name__} {error}; "
+                "expected Mesa's libegl1 and libgl1-mesa-dri, or libosmesa6"
+            ) from error
         self.vertex_array = GL.glGenVertexArrays(1)
-        self.info = {key: GL.glGetString(value).decode() for key, value in (
-            ("gl_vendor", GL.GL_VENDOR), ("gl_renderer", GL.GL_RENDERER), ("gl_version", GL.GL_VERSION))}
+        self.info = {
+            key: GL.glGetString(value).decode()
+            for key, value in (
+                ("gl_vendor", GL.GL_VENDOR),
+                ("gl_renderer", GL.GL_RENDERER),
+                ("gl_version", GL.GL_VERSION),
+            )
+        }
         self.info["platform"] = name
 
     def make_current(self) -> None:
@@ -60,7 +74,9 @@ class Context:
         """Destroy the context and all that it holds."""
         if self._platform is None:
             return
-        if self.name == "egl":  # pyrender's delete_context ends the whole display, other contexts with it
+        if (
+            self.name == "egl"
+        ):  # pyrender's delete_context ends the whole display, other contexts with it
             from OpenGL.EGL import EGL_NO_CONTEXT, EGL_NO_SURFACE, eglDestroyContext, eglMakeCurrent
 
             display, context = self._platform._egl_display, self._platform._egl_context
@@ -81,7 +97,9 @@ def source(path: str, defines: dict[str, object] | None = None) -> str:
         if not file.is_file():
             raise ValueError(f"{seen[-1] if seen else name}: no shader {name}")
         text = file.read_text(encoding="utf-8")
-        return re.sub(r'^#include "([^"]+)"\s*$', lambda m: read(m[1], (*seen, name)), text, flags=re.M)
+        return re.sub(
+            r'^#include "([^"]+)"\s*$', lambda m: read(m[1], (*seen, name)), text, flags=re.M
+        )
 
     head = "#version 330 core\n" + "".join(f"#define {k} {v}\n" for k, v in (defines or {}).items())
     return head + read(path, ())
@@ -90,7 +108,12 @@ def source(path: str, defines: dict[str, object] | None = None) -> str:
 class Program:
     """A linked program. `vertex` and `fragment` are shader files relative to renderer/."""
 
-    def __init__(self, fragment: str, vertex: str = "shaders/fullscreen.vert", defines: dict[str, object] | None = None):
+    def __init__(
+        self,
+        fragment: str,
+        vertex: str = "shaders/fullscreen.vert",
+        defines: dict[str, object] | None = None,
+    ):
         self.name = fragment
         self.id = GL.glCreateProgram()
         for kind, path in ((GL.GL_VERTEX_SHADER, vertex), (GL.GL_FRAGMENT_SHADER, fragment)):
@@ -111,7 +134,9 @@ class Program:
             self._uniforms[name] = (GL.glGetUniformLocation(self.id, name), size, kind)
 
     def use(self, **values) -> None:
-        """Bind the program and set every active uniform by name; one left out or unknown is an error."""
+        """Bind the program and set every active uniform by name; one left out or unknown is an
+        error.
+        """
         missing = self._uniforms.keys() - values.keys()
         unknown = values.keys() - self._uniforms.keys()
         if missing:
@@ -143,30 +168,58 @@ class Program:
             elif kind == GL.GL_FLOAT_MAT4:
                 GL.glUniformMatrix4fv(where, size, GL.GL_TRUE, array)
             else:
-                raise ValueError(f"{self.name}: uniform {name} has a type that this program does not set")
+                raise ValueError(
+                    f"{self.name}: uniform {name} has a type that this program does not set"
+                )
 
     def accepts(self, values: dict) -> dict:
-        """Those of `values` that this program has as active uniforms (for blocks shared by many programs)."""
+        """Those of `values` that this program has as active uniforms (for blocks shared by many
+        programs).
+        """
         return {name: value for name, value in values.items() if name in self._uniforms}
 
 
 class Texture:
     """A 2-D texture. Linear or nearest filter, clamped at the edges."""
 
-    def __init__(self, width: int, height: int, internal: int = GL.GL_RGBA16F, linear: bool = False, data: np.ndarray | None = None,
-                 mipmap: bool = False, repeat: bool = False):
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        internal: int = GL.GL_RGBA16F,
+        linear: bool = False,
+        data: np.ndarray | None = None,
+        mipmap: bool = False,
+        repeat: bool = False,
+    ):
         self.width, self.height, self.internal = width, height, internal
         self.id = GL.glGenTextures(1)
         GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
         form, _ = _FORMATS[internal]
         if data is None:
-            GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width, height, 0, form, GL.GL_FLOAT, None)
+            GL.glTexImage2D(
+                GL.GL_TEXTURE_2D, 0, internal, width, height, 0, form, GL.GL_FLOAT, None
+            )
         else:
             kind = GL.GL_UNSIGNED_BYTE if data.dtype == np.uint8 else GL.GL_FLOAT
             GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-            GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, width, height, 0, form, kind, np.ascontiguousarray(data))
+            GL.glTexImage2D(
+                GL.GL_TEXTURE_2D,
+                0,
+                internal,
+                width,
+                height,
+                0,
+                form,
+                kind,
+                np.ascontiguousarray(data),
+            )
         smooth = GL.GL_LINEAR if linear else GL.GL_NEAREST
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_LINEAR if mipmap else smooth)
+        GL.glTexParameteri(
+            GL.GL_TEXTURE_2D,
+            GL.GL_TEXTURE_MIN_FILTER,
+            GL.GL_LINEAR_MIPMAP_LINEAR if mipmap else smooth,
+        )
         GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MAG_FILTER, smooth)
         wrap = GL.GL_REPEAT if repeat else GL.GL_CLAMP_TO_EDGE
         GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_WRAP_S, wrap)
@@ -187,30 +240,50 @@ class Texture:
 
 
 class Target:
-    """A framebuffer of one texture per internal format, with or without a depth buffer of its own or another's."""
+    """A framebuffer of one texture per internal format, with or without a depth buffer of its own
+    or another's.
+    """
 
-    def __init__(self, width: int, height: int, formats: list[int], depth: bool | "Target" = False, linear: bool = False):
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        formats: list[int],
+        depth: bool | Target = False,
+        linear: bool = False,
+    ):
         self.width, self.height = width, height
         self.textures = [Texture(width, height, internal, linear) for internal in formats]
         self.id = GL.glGenFramebuffers(1)
         self._depth = None
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.id)
         for k, texture in enumerate(self.textures):
-            GL.glFramebufferTexture2D(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0 + k, GL.GL_TEXTURE_2D, texture.id, 0)
+            GL.glFramebufferTexture2D(
+                GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0 + k, GL.GL_TEXTURE_2D, texture.id, 0
+            )
         if depth:
             if depth is True:
                 self._depth = buffer = GL.glGenRenderbuffers(1)
                 GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, buffer)
-                GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, GL.GL_DEPTH_COMPONENT32F, width, height)
+                GL.glRenderbufferStorage(
+                    GL.GL_RENDERBUFFER, GL.GL_DEPTH_COMPONENT32F, width, height
+                )
             else:
                 buffer = depth._depth
-            GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, GL.GL_RENDERBUFFER, buffer)
+            GL.glFramebufferRenderbuffer(
+                GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, GL.GL_RENDERBUFFER, buffer
+            )
         GL.glDrawBuffers(len(formats), [GL.GL_COLOR_ATTACHMENT0 + k for k in range(len(formats))])
         state = GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER)
         if state != GL.GL_FRAMEBUFFER_COMPLETE:
-            raise InputError(f"a {width}x{height} render target is not possible on this driver (status {int(state):#x}); expected a smaller size")
+            raise InputError(
+                f"a {width}x{height} render target is not possible on this driver (status "
+                f"{int(state):#x}); expected a smaller size"
+            )
 
-    def bind(self, clear: tuple[float, ...] | None = None, depth_test: bool = False, blend: bool = False) -> None:
+    def bind(
+        self, clear: tuple[float, ...] | None = None, depth_test: bool = False, blend: bool = False
+    ) -> None:
         """Draw here from now on, with all state that matters set afresh."""
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.id)
         GL.glViewport(0, 0, self.width, self.height)
@@ -225,7 +298,9 @@ class Target:
         if clear is not None:
             GL.glClearColor(*clear)
             GL.glClearDepth(1.0)
-            GL.glClear(GL.GL_COLOR_BUFFER_BIT | (GL.GL_DEPTH_BUFFER_BIT if depth_test and not blend else 0))
+            GL.glClear(
+                GL.GL_COLOR_BUFFER_BIT | (GL.GL_DEPTH_BUFFER_BIT if depth_test and not blend else 0)
+            )
 
     def delete(self) -> None:
         for texture in self.textures:

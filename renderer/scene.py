@@ -1,7 +1,8 @@
 """What is drawn: the model (skin, eyes, hair), the lights, the camera framings.
 
 Lengths are millimetres, y is up, the head looks along +z, the crown is at y = 0.
-Light is radiometric: a lamp gives irradiance E on a surface that faces it; diffuse radiance is albedo * E / pi.
+Light is radiometric: a lamp gives irradiance E on a surface that faces it; diffuse radiance is
+albedo * E / pi.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ import pyrender
 class Skin:
     """The scattering surface.
 
-    positions, normals (N, 3) float32; uvs (N, 2); faces (M, 3). masks: (N, 8) in [0, 1], columns MASKS.
-    proxy: what rays are traced against.
-    maps: albedo (H, W, 3) uint8 sRGB, normal (H, W, 3) uint8 tangent space, roughness (H, W) uint8; None: procedural.
+    positions, normals (N, 3) float32; uvs (N, 2); faces (M, 3). masks: (N, 8) in [0, 1], columns
+    MASKS. proxy: what rays are traced against. maps: albedo (H, W, 3) uint8 sRGB, normal (H, W, 3)
+    uint8 tangent space, roughness (H, W) uint8; None: procedural.
     """
 
     positions: np.ndarray
@@ -26,19 +27,22 @@ class Skin:
     uvs: np.ndarray
     faces: np.ndarray
     masks: np.ndarray
-    proxy: "Proxy"
+    proxy: Proxy
     albedo_map: np.ndarray | None = None
     normal_map: np.ndarray | None = None
     roughness_map: np.ndarray | None = None
     base_colour: tuple[float, float, float] | None = None  # linear albedo where there is no map
-    scatters: np.ndarray | None = None  # (N,) 1 where the material scatters, 0 for eyes and teeth of a scan; None: all of it
+    scatters: np.ndarray | None = (
+        None  # (N,) 1 where the material scatters, 0 for eyes and teeth of a scan; None: all of it
+    )
 
 
 @dataclass(frozen=True)
 class Proxy:
     """A mesh of the skin's shape, coarser or the same, on which light is baked.
 
-    positions, normals (P, 3); faces (Q, 3); albedo (P, 3) linear; to_full: sparse (N, P), carries values to the skin.
+    positions, normals (P, 3); faces (Q, 3); albedo (P, 3) linear; to_full: sparse (N, P), carries
+    values to the skin.
     """
 
     positions: np.ndarray
@@ -53,7 +57,9 @@ MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
 
 @dataclass(frozen=True)
 class Eye:
-    """An eyeball with its cornea: positions, normals (N, 3), faces (M, 3); centre, gaze (3,), radius, iris_radius mm."""
+    """An eyeball with its cornea: positions, normals (N, 3), faces (M, 3); centre, gaze (3,),
+    radius, iris_radius mm.
+    """
 
     positions: np.ndarray
     normals: np.ndarray
@@ -66,8 +72,9 @@ class Eye:
 
 @dataclass(frozen=True)
 class Strands:
-    """Hair as polylines: points (S, P, 3) mm; width_mm (S,); colour (S, 3) linear albedo;
-    cover (S, P) in [0, 1], the share of the hair layer above each point; root_vertex (S,) index into Skin."""
+    """Hair as polylines: points (S, P, 3) mm; width_mm (S,); colour (S, 3) linear albedo; cover (S,
+    P) in [0, 1], the share of the hair layer above each point; root_vertex (S,) index into Skin.
+    """
 
     points: np.ndarray
     width_mm: np.ndarray
@@ -78,7 +85,10 @@ class Strands:
 
 @dataclass(frozen=True)
 class Model:
-    """Everything that stands before the camera. landmarks: name -> (3,) mm, at least eyes, eye_l, eye_r, mouth, nose."""
+    """Everything that stands before the camera.
+
+    landmarks: name -> (3,) mm, at least eyes, eye_l, eye_r, mouth, nose.
+    """
 
     skin: Skin
     eyes: tuple[Eye, ...]
@@ -89,7 +99,8 @@ class Model:
 
 @dataclass(frozen=True)
 class Framing:
-    """A camera: looks at `target` (relative to the eyes' midpoint, mm) so that `height_mm` fill the image's height.
+    """A camera: looks at `target` (relative to the eyes' midpoint, mm) so that `height_mm` fill the
+    image's height.
 
     yaw_deg turns the camera about the head towards the person's left, pitch_deg lifts it.
     """
@@ -126,7 +137,10 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Lobe:
-    """A spherical Gaussian of radiance, amplitude * exp(sharpness * (direction . w - 1)): a soft studio panel."""
+    """A spherical Gaussian of radiance, amplitude * exp(sharpness * (direction .
+
+    w - 1)): a soft studio panel.
+    """
 
     direction: tuple[float, float, float]
     sharpness: float
@@ -135,7 +149,9 @@ class Lobe:
 
 @dataclass(frozen=True)
 class Studio:
-    """The light of every condition: two shadowed lamps and an environment of soft panels over a constant."""
+    """The light of every condition: two shadowed lamps and an environment of soft panels over a
+    constant.
+    """
 
     lamps: tuple[Lamp, ...] = (
         Lamp("key", (-0.62, 0.55, 0.72), (4.5, 4.15, 3.7), 1.1),
@@ -156,11 +172,15 @@ class Studio:
         total = np.tile(np.array(self.ambient, dtype=float), (len(directions), 1))
         for lobe in self.lobes:
             axis = np.array(lobe.direction) / np.linalg.norm(lobe.direction)
-            total += np.exp(lobe.sharpness * (directions @ axis - 1))[:, None] * np.array(lobe.amplitude)
+            total += np.exp(lobe.sharpness * (directions @ axis - 1))[:, None] * np.array(
+                lobe.amplitude
+            )
         return total
 
     def uniforms(self) -> dict:
-        axes = np.array([np.array(lobe.direction) / np.linalg.norm(lobe.direction) for lobe in self.lobes])
+        axes = np.array(
+            [np.array(lobe.direction) / np.linalg.norm(lobe.direction) for lobe in self.lobes]
+        )
         return {
             "lobe_axis": np.column_stack([axes, [lobe.sharpness for lobe in self.lobes]]),
             "lobe_colour": np.array([lobe.amplitude for lobe in self.lobes]),
@@ -176,7 +196,9 @@ STUDIO = Studio()
 
 @dataclass(frozen=True)
 class View:
-    """A framing resolved for one model and image size: matrices (4, 4), eye (3,), pixels per mm at 1 mm distance."""
+    """A framing resolved for one model and image size: matrices (4, 4), eye (3,), pixels per mm at
+    1 mm distance.
+    """
 
     view: np.ndarray
     projection: np.ndarray
@@ -195,26 +217,46 @@ def look_at(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     return pose
 
 
-def resolve(framing: Framing, landmarks: dict[str, np.ndarray], width: int, height: int, studio: Studio = STUDIO) -> View:
+def resolve(
+    framing: Framing,
+    landmarks: dict[str, np.ndarray],
+    width: int,
+    height: int,
+    studio: Studio = STUDIO,
+) -> View:
     """Place the camera and the lamps in a pyrender scene and take its matrices."""
     fov = np.radians(framing.fov_y_deg)
     distance = framing.height_mm / (2 * np.tan(fov / 2))
     yaw, pitch = np.radians(framing.yaw_deg), np.radians(framing.pitch_deg)
     target = np.asarray(landmarks["eyes"], dtype=float) + framing.target
-    eye = target + distance * np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
+    eye = target + distance * np.array(
+        [np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)]
+    )
     pose = look_at(eye, target)
     camera = pyrender.PerspectiveCamera(yfov=fov, znear=0.25 * distance, zfar=distance + 1500.0)
     scene = pyrender.Scene(bg_color=np.zeros(4), ambient_light=np.zeros(3))
     scene.add(camera, pose=pose)
     for lamp in studio.lamps:
-        scene.add(pyrender.DirectionalLight(color=np.array(lamp.irradiance) / max(lamp.irradiance), intensity=max(lamp.irradiance)),
-                  pose=look_at(lamp.towards, np.zeros(3)))
-    return View(np.linalg.inv(scene.get_pose(scene.main_camera_node)), camera.get_projection_matrix(width, height), eye,
-                height / (2 * np.tan(fov / 2)), scene)
+        scene.add(
+            pyrender.DirectionalLight(
+                color=np.array(lamp.irradiance) / max(lamp.irradiance),
+                intensity=max(lamp.irradiance),
+            ),
+            pose=look_at(lamp.towards, np.zeros(3)),
+        )
+    return View(
+        np.linalg.inv(scene.get_pose(scene.main_camera_node)),
+        camera.get_projection_matrix(width, height),
+        eye,
+        height / (2 * np.tan(fov / 2)),
+        scene,
+    )
 
 
 def lamp_matrix(lamp: Lamp, positions: np.ndarray) -> np.ndarray:
-    """World to the lamp's box (4, 4): x, y in [-1, 1] over the model's extent; z = distance along the light, mm, from its nearest point."""
+    """World to the lamp's box (4, 4): x, y in [-1, 1] over the model's extent; z = distance along
+    the light, mm, from its nearest point.
+    """
     pose = look_at(lamp.towards, np.zeros(3))[:3, :3]
     local = positions @ pose
     low, high = local.min(axis=0) - 2.0, local.max(axis=0) + 2.0

@@ -1,10 +1,10 @@
 """From a study to its images and their manifest.
 
-The folder holds images/, the manifest, and build.json: for every finished image the key of what it was
-rendered from and its entry in the manifest. An image is rendered when its key is new or its file is not
-the one that was written, so that a second build renders only what changed and an interrupted one goes on.
-Files are written under another name and then renamed: there is never half a file. The manifest is written
-last, and is not there while images are missing.
+The folder holds images/, the manifest, and build.json: for every finished image the key of what it
+was rendered from and its entry in the manifest. An image is rendered when its key is new or its
+file is not the one that was written, so that a second build renders only what changed and an
+interrupted one goes on. Files are written under another name and then renamed: there is never half
+a file. The manifest is written last, and is not there while images are missing.
 """
 
 import dataclasses
@@ -32,7 +32,9 @@ _SOURCES = (_ROOT / "renderer", _ROOT / "stimuli" / "heads")
 
 @dataclass(frozen=True)
 class Stimulus:
-    """An image to make: `parameters` is the validated dataclass of its technique, `key` a sha256."""
+    """An image to make: `parameters` is the validated dataclass of its technique,
+    `key` a sha256.
+    """
 
     framing: str
     condition: str
@@ -43,19 +45,25 @@ class Stimulus:
 
 @dataclass(frozen=True)
 class Built:
-    """How many images a build rendered, how many it found up to date, and what there is to say of the head."""
+    """How many images a build rendered, how many it found up to date, and what there is to say of
+    the head.
+    """
 
     rendered: int
     kept: int
     notes: tuple[str, ...] = ()
 
 
-def build(study: Study, out: str | Path, force: bool = False, progress: bool = False, rounds: int = 0) -> Built:
-    """Render what is missing or out of date of the study's images into `out`, and write the manifest.
+def build(
+    study: Study, out: str | Path, force: bool = False, progress: bool = False, rounds: int = 0
+) -> Built:
+    """Render what is missing or out of date of the study's images into `out`, and write the
+    manifest.
 
-    `force` renders every image anew; `progress` shows a bar on stderr. `rounds` also times every technique so often and
-    puts the median milliseconds of scattering alone into the manifest: they differ from run to run. Images of one study come from one
-    OpenGL driver: when it differs from that of the finished images, these are rendered anew as well.
+    `force` renders every image anew; `progress` shows a bar on stderr. `rounds` also times every
+    technique so often and puts the median milliseconds of scattering alone into the manifest: they
+    differ from run to run. Images of one study come from one OpenGL driver: when it differs from
+    that of the finished images, these are rendered anew as well.
     """
     out = Path(out)
     parameters = resolve(study)
@@ -70,7 +78,9 @@ def build(study: Study, out: str | Path, force: bool = False, progress: bool = F
     kept = set() if force else {s.file for s in plan if _is_finished(out, s, state)}
     if len(kept) < len(plan) or rounds:
         render = study.render
-        with Renderer(head.model, size=render.size, supersample=render.supersample, seed=render.seed) as drawing:
+        with Renderer(
+            head.model, size=render.size, supersample=render.supersample, seed=render.seed
+        ) as drawing:
             driver = drawing.info()
             kept = {file for file in kept if _same_driver(state[file]["image"]["renderer"], driver)}
             todo = [s for s in plan if s.file not in kept]
@@ -98,12 +108,15 @@ def resolve(study: Study) -> dict[str, Any]:
     for i, framing in enumerate(study.framings):
         if framing.name not in renderer.FRAMINGS:
             raise InputError(
-                f"study {study.name}: framings[{i}].name: got {framing.name!r}, expected one of {', '.join(renderer.FRAMINGS)}"
+                f"study {study.name}: framings[{i}].name: got {framing.name!r}, expected one "
+                f"of {', '.join(renderer.FRAMINGS)}"
             )
     resolved = {}
     for i, condition in enumerate(study.techniques):
         try:
-            resolved[condition.name] = renderer.make(condition.technique, _frozen(condition.parameters))
+            resolved[condition.name] = renderer.make(
+                condition.technique, _frozen(condition.parameters)
+            )
         except renderer.errors.InputError as error:
             raise InputError(f"study {study.name}: techniques[{i}]: {error}") from error
     return resolved
@@ -116,8 +129,9 @@ def samples_per_pixel(samples: np.ndarray) -> float:
 
 
 def commit() -> str | None:
-    """The git commit of the checkout that this package runs from, with "-dirty" where tracked source
-    that shapes the images differs from it; None where there is no checkout or no git."""
+    """The git commit of the checkout that this package runs from, with "-dirty" where tracked
+    source that shapes the images differs from it; None where there is no checkout or no git.
+    """
 
     def git(*args: str) -> subprocess.CompletedProcess:
         return subprocess.run(["git", "-C", str(_ROOT), *args], capture_output=True, text=True)
@@ -131,12 +145,18 @@ def commit() -> str | None:
     top, head = found.stdout.splitlines()
     if Path(top).resolve() != _ROOT:
         return None
-    return head + ("-dirty" if git("diff", "--quiet", "HEAD", "--", "renderer", "stimuli").returncode else "")
+    return head + (
+        "-dirty" if git("diff", "--quiet", "HEAD", "--", "renderer", "stimuli").returncode else ""
+    )
 
 
 def _plan(study: Study, parameters: dict[str, Any], provenance: dict) -> list[Stimulus]:
     """Every image of the study, framing by framing."""
-    common = {"render": dataclasses.asdict(study.render), "head": provenance, "source": _source_digest()}
+    common = {
+        "render": dataclasses.asdict(study.render),
+        "head": provenance,
+        "source": _source_digest(),
+    }
     plan = []
     for framing in study.framings:
         for condition in study.techniques:
@@ -161,7 +181,9 @@ def _source_digest() -> str:
     for folder in _SOURCES:
         for path in sorted(folder.rglob("*")):
             if path.is_file() and "__pycache__" not in path.parts:
-                digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+                digest.update(
+                    path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes()
+                )
     return digest.hexdigest()
 
 
@@ -177,9 +199,17 @@ def _same_driver(recorded: dict, driver: dict) -> bool:
 
 
 def _render(
-    study: Study, todo: list[Stimulus], drawing: Any, out: Path, state: dict, entry: dict, progress: bool
+    study: Study,
+    todo: list[Stimulus],
+    drawing: Any,
+    out: Path,
+    state: dict,
+    entry: dict,
+    progress: bool,
 ) -> None:
-    """Render framing by framing, so that the shared passes are drawn once; record each finished image."""
+    """Render framing by framing, so that the shared passes are drawn once; record each finished
+    image.
+    """
     from tqdm import tqdm
 
     techniques = {condition.name: condition.technique for condition in study.techniques}
@@ -214,7 +244,8 @@ def _render(
                     bar.update()
     except KeyboardInterrupt as error:
         raise Stopped(
-            f"stopped with {finished} of {len(todo)} images rendered; `subdermal build` without --force goes on from there"
+            f"stopped with {finished} of {len(todo)} images rendered; `subdermal build` "
+            "without --force goes on from there"
         ) from error
 
 
@@ -223,12 +254,16 @@ def _time(plan: list[Stimulus], drawing: Any, out: Path, state: dict, rounds: in
     for framing in dict.fromkeys(s.framing for s in plan):
         shown = {s.file: s.parameters for s in plan if s.framing == framing}
         for file, spent in drawing.frame(framing).time(shown, rounds).items():
-            state[file]["image"]["measures"]["milliseconds"] = round(1000 * float(np.median(spent[:, 0])), 1)
+            state[file]["image"]["measures"]["milliseconds"] = round(
+                1000 * float(np.median(spent[:, 0])), 1
+            )
     _write_json(out / STATE, {"format": STATE_FORMAT, "images": state})
 
 
 def _remove_strays(out: Path, state: dict, wanted: Iterable[str]) -> None:
-    """Remove images of an earlier version of the study: those that a build wrote and nobody changed."""
+    """Remove images of an earlier version of the study: those that a build wrote and nobody
+    changed.
+    """
     strays = [file for file in state if file not in wanted]
     for file in strays:
         done, path = state.pop(file), out / file
@@ -239,11 +274,16 @@ def _remove_strays(out: Path, state: dict, wanted: Iterable[str]) -> None:
 
 
 def _read_state(out: Path) -> dict:
-    """The finished images by file: {"key", "image"}. Refuses a folder whose manifest is not a build's."""
+    """The finished images by file: {"key", "image"}. Refuses a folder whose manifest is not a
+    build's.
+    """
     path = out / STATE
     if not path.exists():
         if (out / manifest.NAME).exists():
-            raise InputError(f"{out / manifest.NAME}: not written by a build, and not overwritten: choose another folder")
+            raise InputError(
+                f"{out / manifest.NAME}: not written by a build, and not overwritten: choose "
+                "another folder"
+            )
         return {}
     try:
         record = json.loads(path.read_bytes())
@@ -251,7 +291,9 @@ def _read_state(out: Path) -> dict:
             return record["images"]
     except (ValueError, KeyError, TypeError):
         pass
-    raise InputError(f"{path}: not the record of a build of this version: delete it to render everything anew")
+    raise InputError(
+        f"{path}: not the record of a build of this version: delete it to render everything anew"
+    )
 
 
 def _write_png(path: Path, pixels: np.ndarray, size: tuple[int, int]) -> str:
@@ -259,7 +301,10 @@ def _write_png(path: Path, pixels: np.ndarray, size: tuple[int, int]) -> str:
     import PIL.Image
 
     if pixels.shape != (size[1], size[0], 3) or pixels.dtype != np.uint8:
-        raise RuntimeError(f"{path}: rendered {pixels.shape} {pixels.dtype}, expected {(size[1], size[0], 3)} uint8")
+        raise RuntimeError(
+            f"{path}: rendered {pixels.shape} {pixels.dtype}, expected "
+            f"{(size[1], size[0], 3)} uint8"
+        )
     with _replacing(path) as temporary:
         PIL.Image.fromarray(pixels).save(temporary, format="PNG")
         return manifest.sha256(temporary)
@@ -267,7 +312,9 @@ def _write_png(path: Path, pixels: np.ndarray, size: tuple[int, int]) -> str:
 
 def _write_json(path: Path, record: dict) -> None:
     with _replacing(path) as temporary:
-        temporary.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        temporary.write_text(
+            json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
 
 
 @contextmanager
@@ -283,7 +330,9 @@ def _replacing(path: Path) -> Iterator[Path]:
 
 def _jsonable(parameters: Any) -> dict:
     """A dataclass of parameters as JSON would give it back."""
-    return json.loads(json.dumps(dataclasses.asdict(parameters), default=lambda array: array.tolist()))
+    return json.loads(
+        json.dumps(dataclasses.asdict(parameters), default=lambda array: array.tolist())
+    )
 
 
 def _frozen(value: Any) -> Any:

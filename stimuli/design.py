@@ -17,12 +17,15 @@ class Trial:
     right: str
 
 
-def trials(framings: Sequence[str], techniques: Sequence[str], seed: int, participant: int) -> list[Trial]:
+def trials(
+    framings: Sequence[str], techniques: Sequence[str], seed: int, participant: int
+) -> list[Trial]:
     """The trials of one participant: every pair of techniques once within each framing.
 
-    The order is shuffled over all framings and the sides are drawn at random. Both come from the raw
-    64-bit words of PCG64 seeded by (seed, participant): unlike the distributions built on them, numpy
-    promises never to change those (NEP 19), so a seed gives the same study under every version.
+    The order is shuffled over all framings and the sides are drawn at random. Both come from the
+    raw 64-bit words of PCG64 seeded by (seed, participant): unlike the distributions built on them,
+    numpy promises never to change those (NEP 19), so a seed gives the same study under every
+    version.
 
     Parameters
     ----------

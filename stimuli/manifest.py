@@ -1,7 +1,7 @@
 """The manifest: what a study shows, image by image. The only thing that the questionnaire reads.
 
-`stimuli.build` writes it; a study of ready-made images has it written by hand (`study` as in a study's
-TOML file, `images` with `framing`, `technique`, `file`, `width`, `height`, `sha256`).
+`stimuli.build` writes it; a study of ready-made images has it written by hand (`study` as in a
+study's TOML file, `images` with `framing`, `technique`, `file`, `width`, `height`, `sha256`).
 """
 
 import hashlib
@@ -16,7 +16,8 @@ from stimuli.table import Table
 
 NAME = "manifest.json"
 FORMAT = "subdermal-manifest/1"
-#: What `analyse` sets beside worth: samples a pixel where light is scattered, milliseconds an image, and distances to the reference.
+#: What `analyse` sets beside worth: samples a pixel where light is scattered, milliseconds an
+#: image, and distances to the reference.
 MEASURES = ("samples_per_pixel", "milliseconds", "dssim", "flip")
 _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
 
@@ -25,7 +26,8 @@ _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".we
 class Image:
     """An image of the study. `renderer` and `head` are None where it was made elsewhere.
 
-    measures: what it cost and how far it is from the reference, where that is known: see `MEASURES`.
+    measures: what it cost and how far it is from the reference, where that is known: see
+    `MEASURES`.
     """
 
     framing: str
@@ -65,13 +67,17 @@ class Manifest:
 
 
 def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
-    """Read DIR/manifest.json and validate it; with `verify` also each file's sha256 and size in pixels."""
+    """Read DIR/manifest.json and validate it; with `verify` also each file's sha256 and size in
+    pixels.
+    """
     directory = Path(directory)
     path = directory / NAME
     try:
         value = json.loads(path.read_bytes())
     except FileNotFoundError as error:
-        raise InputError(f"{path}: not there; `subdermal build STUDY.toml --out {directory}` writes it") from error
+        raise InputError(
+            f"{path}: not there; `subdermal build STUDY.toml --out {directory}` writes it"
+        ) from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
@@ -109,9 +115,16 @@ def sha256(path: Path) -> str:
 def _image(entry: Table, study: Study, directory: Path) -> Image:
     def inside(text: str) -> bool:
         parts = PurePosixPath(text)
-        return not parts.is_absolute() and ".." not in parts.parts and parts.suffix.lower() in _MEDIA
+        return (
+            not parts.is_absolute() and ".." not in parts.parts and parts.suffix.lower() in _MEDIA
+        )
 
-    file = entry.take("file", str, f"the path of a file inside the study's folder that ends in {', '.join(_MEDIA)}", inside)
+    file = entry.take(
+        "file",
+        str,
+        f"the path of a file inside the study's folder that ends in {', '.join(_MEDIA)}",
+        inside,
+    )
     image = Image(
         framing=entry.one_of("framing", (framing.name for framing in study.framings)),
         technique=entry.one_of("technique", (condition.name for condition in study.techniques)),
@@ -132,7 +145,13 @@ def _image(entry: Table, study: Study, directory: Path) -> Image:
 
 def _measures(table: Table) -> dict:
     for key in MEASURES:
-        table.take(key, (int, float), "a number from 0", lambda value: not isinstance(value, bool) and 0 <= value < math.inf, default=0)
+        table.take(
+            key,
+            (int, float),
+            "a number from 0",
+            lambda value: not isinstance(value, bool) and 0 <= value < math.inf,
+            default=0,
+        )
     table.end()
     return table.value
 
@@ -142,21 +161,34 @@ def _is_sha256(text: str) -> bool:
 
 
 def _one_each(study: Study, images: tuple[Image, ...], entries: list[Table], table: Table) -> None:
-    """Each framing and technique has exactly one image, of a file of its own, in one size a framing."""
+    """Each framing and technique has exactly one image, of a file of its own, in one size a
+    framing.
+    """
     seen, files, sizes = {}, {}, {}
     for image, entry in zip(images, entries):
         pair, size = (image.framing, image.technique), (image.width, image.height)
         if pair in seen:
-            raise InputError(f"{entry.source}: {entry.key}: a second image of {pair[1]} at {pair[0]}, after {seen[pair]}")
+            raise InputError(
+                f"{entry.source}: {entry.key}: a second image of {pair[1]} at {pair[0]}, "
+                f"after {seen[pair]}"
+            )
         if image.file in files:
-            raise entry.fault("file", image.file, f"a file that differs from that of {files[image.file]}")
+            raise entry.fault(
+                "file", image.file, f"a file that differs from that of {files[image.file]}"
+            )
         if sizes.setdefault(image.framing, size) != size:
-            raise entry.fault("width, height", size, f"{sizes[image.framing]}, as the other images at {image.framing}")
+            raise entry.fault(
+                "width, height",
+                size,
+                f"{sizes[image.framing]}, as the other images at {image.framing}",
+            )
         seen[pair] = files[image.file] = entry.key
     for framing in study.framings:
         for condition in study.techniques:
             if (framing.name, condition.name) not in seen:
-                raise InputError(f"{table.source}: images: none of {condition.name} at {framing.name}")
+                raise InputError(
+                    f"{table.source}: images: none of {condition.name} at {framing.name}"
+                )
 
 
 def _verify(image: Image, entry: Table) -> None:
@@ -166,11 +198,17 @@ def _verify(image: Image, entry: Table) -> None:
         raise entry.fault("file", image.file, f"a file that is there; {image.path} is not")
     digest = sha256(image.path)
     if digest != image.sha256:
-        raise entry.fault("sha256", image.sha256, f"that of {image.file}, {digest}; the file was changed after the manifest")
+        raise entry.fault(
+            "sha256",
+            image.sha256,
+            f"that of {image.file}, {digest}; the file was changed after the manifest",
+        )
     try:
         with PIL.Image.open(image.path) as picture:
             size = picture.size
     except (OSError, PIL.Image.DecompressionBombError) as error:
         raise entry.fault("file", image.file, "an image that can be read") from error
     if size != (image.width, image.height):
-        raise entry.fault("width, height", (image.width, image.height), f"{size}, the size of {image.file}")
+        raise entry.fault(
+            "width, height", (image.width, image.height), f"{size}, the size of {image.file}"
+        )

@@ -1,4 +1,6 @@
-"""A comparison strip: the same crop of every condition of a study, side by side and named, pixel for pixel."""
+"""A comparison strip: the same crop of every condition of a study, side by side and named, pixel
+for pixel.
+"""
 
 from __future__ import annotations
 
@@ -19,32 +21,50 @@ def parse_crop(text: str) -> tuple[int, int, int, int]:
     """(x, y, width, height) from "WIDTHxHEIGHT+X+Y", ImageMagick's geometry."""
     found = CROP.fullmatch(text)
     if not found or not int(found[1]) or not int(found[2]):
-        raise InputError(f"the crop is {text!r}; expected WIDTHxHEIGHT+X+Y, such as 400x400+760+480")
+        raise InputError(
+            f"the crop is {text!r}; expected WIDTHxHEIGHT+X+Y, such as 400x400+760+480"
+        )
     width, height, x, y = map(int, found.groups())
     return x, y, width, height
 
 
 def strip(folder: str | Path, framing: str, crops: list[tuple[int, int, int, int]]) -> Image.Image:
-    """One column a condition in the study's order, one row a crop (the whole image without crops), names above."""
+    """One column a condition in the study's order, one row a crop (the whole image without crops),
+    names above.
+    """
     manifest = load_manifest(Path(folder))
     names = [f.name for f in manifest.study.framings]
     if framing not in names:
         raise InputError(f"{folder}: no framing {framing!r}; expected one of {', '.join(names)}")
     columns = []
     for condition in manifest.study.techniques:
-        path = next(i.path for i in manifest.images if (i.framing, i.technique) == (framing, condition.name))
+        path = next(
+            i.path for i in manifest.images if (i.framing, i.technique) == (framing, condition.name)
+        )
         columns.append((condition.label, Image.open(path).convert("RGB")))
     width, height = columns[0][1].size
     boxes = crops or [(0, 0, width, height)]
     for x, y, w, h in boxes:
         if x + w > width or y + h > height or w != boxes[0][2]:
-            raise InputError(f"the crop {w}x{h}+{x}+{y} does not fit; expected one width for all crops, inside {width}x{height}")
+            raise InputError(
+                f"the crop {w}x{h}+{x}+{y} does not fit; expected one width for all crops, "
+                f"inside {width}x{height}"
+            )
     column = boxes[0][2]
-    sheet = Image.new("RGB", (len(columns) * (column + GAP_PX) - GAP_PX, BAND_PX + sum(h + GAP_PX for *_, h in boxes) - GAP_PX), (24, 24, 26))
+    sheet = Image.new(
+        "RGB",
+        (
+            len(columns) * (column + GAP_PX) - GAP_PX,
+            BAND_PX + sum(h + GAP_PX for *_, h in boxes) - GAP_PX,
+        ),
+        (24, 24, 26),
+    )
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(20)
     for k, (label, image) in enumerate(columns):
         left, top = k * (column + GAP_PX), BAND_PX
-        draw.text((left + column / 2, BAND_PX / 2), label, font=font, fill=(236, 236, 236), anchor="mm")
+        draw.text(
+            (left + column / 2, BAND_PX / 2), label, font=font, fill=(236, 236, 236), anchor="mm"
+        )
         for x, y, w, h in boxes:
             sheet.paste(image.crop((x, y, x + w, y + h)), (left, top))
             top += h + GAP_PX

@@ -1,8 +1,9 @@
 """The definition of a study: what is shown, what is asked, how it is rendered.
 
 A study is a TOML file (studies/thesis.toml is the one to copy). What it asks (`question`, `scale`,
-`familiarity`, `consent`) may be left out and is then asked as in the thesis; what it declares of its analysis
-(`analysis`: margins, tests, exclusions) may be left out too. Nothing here renders, and nothing here knows which techniques and framings there are: `stimuli.build` asks the renderer.
+`familiarity`, `consent`) may be left out and is then asked as in the thesis; what it declares of
+its analysis (`analysis`: margins, tests, exclusions) may be left out too. Nothing here renders, and
+nothing here knows which techniques and framings there are: `stimuli.build` asks the renderer.
 """
 
 import tomllib
@@ -64,7 +65,9 @@ class Familiarity:
 
 @dataclass(frozen=True)
 class Render:
-    """How the images are rendered: size (width, height) in pixels, samples a pixel along each axis."""
+    """How the images are rendered: size (width, height) in pixels, samples a pixel along each
+    axis.
+    """
 
     size: tuple[int, int]
     supersample: int
@@ -73,7 +76,9 @@ class Render:
 
 @dataclass(frozen=True)
 class HeadChoice:
-    """The head: "default" or the file of a scan; the unit of its coordinates and its upward axis, None to find out."""
+    """The head: "default" or the file of a scan; the unit of its coordinates and its upward axis,
+    None to find out.
+    """
 
     name: str
     unit: str | None = None
@@ -82,7 +87,11 @@ class HeadChoice:
 
 @dataclass(frozen=True)
 class Study:
-    """A study. `render` and `head` are None where the images are ready-made; `analysis` is what it declares of its analysis."""
+    """A study.
+
+    `render` and `head` are None where the images are ready-made; `analysis` is what it declares of
+    its analysis.
+    """
 
     name: str
     title: str
@@ -109,7 +118,10 @@ class Study:
             "techniques": [{"name": t.name, "label": t.label} for t in self.techniques],
             "question": vars(self.question),
             "scale": [vars(level) for level in self.scale],
-            "familiarity": {"question": self.familiarity.question, "labels": list(self.familiarity.labels)},
+            "familiarity": {
+                "question": self.familiarity.question,
+                "labels": list(self.familiarity.labels),
+            },
             "consent": self.consent,
             **({"analysis": self.analysis} if self.analysis else {}),
         }
@@ -127,7 +139,9 @@ def load_study(path: str | Path) -> Study:
     study = read_study(
         table,
         render=Render(
-            (width, height), render.number("supersample", 1, 4, default=2), render.number("seed", 0, 2**63 - 1, default=0)
+            (width, height),
+            render.number("supersample", 1, 4, default=2),
+            render.number("seed", 0, 2**63 - 1, default=0),
         ),
         head=_head(head, path.parent),
     )
@@ -137,7 +151,9 @@ def load_study(path: str | Path) -> Study:
 
 
 def read_study(table: Table, render: Render | None = None, head: HeadChoice | None = None) -> Study:
-    """The study in a table of a TOML file or of a manifest; without `render`, images are ready-made."""
+    """The study in a table of a TOML file or of a manifest; without `render`, images are
+    ready-made.
+    """
     asked = Table({**_thesis_asks(), **table.value}, table.source, table.key)
     framings = table.tables("framings", least=1)
     techniques = table.tables("techniques", least=2)
@@ -188,7 +204,12 @@ def _condition(table: Table, rendered: bool) -> Condition:
     name, label = table.name("name"), table.text("label")
     if not rendered:
         return Condition(name, label, name)
-    return Condition(name, label, table.name("technique", default=name), table.take("parameters", dict, default={}))
+    return Condition(
+        name,
+        label,
+        table.name("technique", default=name),
+        table.take("parameters", dict, default={}),
+    )
 
 
 def _question(table: Table) -> Question:
@@ -212,28 +233,50 @@ def _familiarity(table: Table) -> Familiarity:
     def five_texts(value: list) -> bool:
         return len(value) == 5 and all(isinstance(text, str) and text.strip() for text in value)
 
-    labels = table.take("labels", list, "a list of 5 texts, from the lowest to the highest", five_texts)
+    labels = table.take(
+        "labels", list, "a list of 5 texts, from the lowest to the highest", five_texts
+    )
     familiarity = Familiarity(table.text("question"), tuple(labels))
     table.end()
     return familiarity
 
 
 def _analysis(table: Table) -> dict:
-    """What the study declares of its analysis before anybody is asked, as `analysis.options` names it; a rule that is false is off."""
+    """What the study declares of its analysis before anybody is asked, as `analysis.options` names
+    it; a rule that is false is off.
+    """
 
     def number(of: Table, key: str, low: float, high: float, off: bool = False) -> None:
         def valid(value: float | bool) -> bool:
-            return (off and value is False) or (not isinstance(value, bool) and low <= value <= high)
+            return (off and value is False) or (
+                not isinstance(value, bool) and low <= value <= high
+            )
 
-        of.take(key, (int, float), f"a number from {low:g} to {high:g}" + (" or false" if off else ""), valid, default=0)
+        of.take(
+            key,
+            (int, float),
+            f"a number from {low:g} to {high:g}" + (" or false" if off else ""),
+            valid,
+            default=0,
+        )
 
     number(table, "margin", 0.001, 4)
     number(table, "margin_jod", 0.001, 20)
     number(table, "level", 0.501, 0.999)
     table.number("resamples", 100, 1_000_000, default=0)
     table.number("seed", 0, 2**63 - 1, default=0)
-    for key, known in (("test", ("wilcoxon", "sign")), ("family", ("study", "framing")), ("ties", ("half", "drop"))):
-        table.take(key, str, f"one of {', '.join(known)}", lambda text, known=known: text in known, default=known[0])
+    for key, known in (
+        ("test", ("wilcoxon", "sign")),
+        ("family", ("study", "framing")),
+        ("ties", ("half", "drop")),
+    ):
+        table.take(
+            key,
+            str,
+            f"one of {', '.join(known)}",
+            lambda text, known=known: text in known,
+            default=known[0],
+        )
     rules = table.table("exclusions", default={})
     for key in ("answered_share", "one_side_share", "same_answer_share", "repeat_share"):
         number(rules, key, 0, 1, off=True)
@@ -248,10 +291,16 @@ def _size(table: Table) -> tuple[int, int]:
     def pixels(value: list) -> bool:
         return len(value) == 2 and all(type(side) is int and 16 <= side <= 8192 for side in value)
 
-    return tuple(table.take("size", list, "[width, height] in pixels, 16 to 8192 each", pixels, default=[1920, 1080]))
+    return tuple(
+        table.take(
+            "size", list, "[width, height] in pixels, 16 to 8192 each", pixels, default=[1920, 1080]
+        )
+    )
 
 
 def _head(table: Table, beside: Path) -> HeadChoice:
     name = table.text("name", default="default")
     file = str(beside / name) if Path(name).suffix else name
-    return HeadChoice(file, table.one_of("unit", UNITS, default=None), table.one_of("up", AXES, default=None))
+    return HeadChoice(
+        file, table.one_of("unit", UNITS, default=None), table.one_of("up", AXES, default=None)
+    )

@@ -1,4 +1,6 @@
-"""Tables read from TOML or JSON that are checked key by key, so that an error can name the key at fault."""
+"""Tables read from TOML or JSON that are checked key by key, so that an error can name the key at
+fault.
+"""
 
 import difflib
 import re
@@ -46,24 +48,34 @@ class Table:
                 raise InputError(f"{self.source}: {self.at(key)}: missing, expected {expected}")
             return default
         value = self.value[key]
-        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)) or not valid(value):
+        if (
+            not isinstance(value, kind)
+            or (kind is int and isinstance(value, bool))
+            or not valid(value)
+        ):
             raise self.fault(key, value, expected)
         return value
 
     def text(self, key: str, **options) -> str:
         """A text that is not blank."""
-        return self.take(key, str, "a text that is not blank", lambda value: bool(value.strip()), **options)
+        return self.take(
+            key, str, "a text that is not blank", lambda value: bool(value.strip()), **options
+        )
 
     def name(self, key: str, **options) -> str:
         """A name fit for file names, columns and keys."""
         pattern = r"[a-z0-9]([a-z0-9_-]*[a-z0-9])?"
         expected = "a name of small letters, digits, '-' and '_'"
-        return self.take(key, str, expected, lambda value: re.fullmatch(pattern, value) is not None, **options)
+        return self.take(
+            key, str, expected, lambda value: re.fullmatch(pattern, value) is not None, **options
+        )
 
     def one_of(self, key: str, values: Iterable[str], **options) -> str:
         """One of a few texts."""
         values = list(values)
-        return self.take(key, str, f"one of {', '.join(values)}", lambda value: value in values, **options)
+        return self.take(
+            key, str, f"one of {', '.join(values)}", lambda value: value in values, **options
+        )
 
     def number(self, key: str, low: int, high: int, **options) -> int:
         """An integer from low to high, both included."""
@@ -79,8 +91,14 @@ class Table:
         if most is None:
             expected = f"a list of at least {least} tables"
         else:
-            expected = f"a list of {least} tables" if least == most else f"a list of {least} to {most} tables"
-        values = self.take(key, list, expected, lambda value: least <= len(value) <= (most or len(value)))
+            expected = (
+                f"a list of {least} tables"
+                if least == most
+                else f"a list of {least} to {most} tables"
+            )
+        values = self.take(
+            key, list, expected, lambda value: least <= len(value) <= (most or len(value))
+        )
         for i, value in enumerate(values):
             if not isinstance(value, dict):
                 raise self.fault(f"{key}[{i}]", value, "a table")
@@ -91,7 +109,11 @@ class Table:
         for key in self.value:
             if key not in self._taken:
                 near = difflib.get_close_matches(key, self._taken, 1)
-                hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(sorted(self._taken))}"
+                hint = (
+                    f"did you mean {near[0]!r}?"
+                    if near
+                    else f"expected one of {', '.join(sorted(self._taken))}"
+                )
                 raise InputError(f"{self.source}: {self.at(key)}: unknown key, {hint}")
 
 

@@ -14,7 +14,14 @@ MAY_IMPORT = {
     "stimuli": {"renderer"},
     "app": {"analysis", "stimuli.design", "stimuli.errors", "stimuli.manifest", "stimuli.study"},
 }
-PROFILE_VERBS = {"profile", "fit", "redraw", "judge", "montecarlo", "media"}  # what they hand over to needs no OpenGL
+PROFILE_VERBS = {
+    "profile",
+    "fit",
+    "redraw",
+    "judge",
+    "montecarlo",
+    "media",
+}  # what they hand over to needs no OpenGL
 MODULES = [path for package in MAY_IMPORT for path in sorted((ROOT / package).rglob("*.py"))]
 
 
@@ -25,7 +32,9 @@ def imported(source: str, package: str) -> set[str]:
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            parts = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            parts = (
+                package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            )
             base = ".".join([*parts, *([node.module] if node.module else [])])
             names.update(f"{base}.{alias.name}" for alias in node.names)
     return names
@@ -33,12 +42,19 @@ def imported(source: str, package: str) -> set[str]:
 
 def forbidden(names: set[str], package: str, allowed: set[str]) -> set[str]:
     """Those of `names` that lie in another package of ours and in none of the allowed modules."""
-    ours = {name for name in names if name.split(".")[0] in MAY_IMPORT and name.split(".")[0] != package}
-    return {name for name in ours if not any(f"{name}.".startswith(f"{module}.") for module in allowed)}
+    ours = {
+        name for name in names if name.split(".")[0] in MAY_IMPORT and name.split(".")[0] != package
+    }
+    return {
+        name for name in ours if not any(f"{name}.".startswith(f"{module}.") for module in allowed)
+    }
 
 
 def test_the_rule_finds_what_it_forbids():
-    source = "import renderer.gl\nfrom stimuli import build, study\nfrom .. import x\nfrom ..a import y\nimport numpy"
+    source = (
+        "import renderer.gl\nfrom stimuli import build, study\nfrom .. import x\nfrom "
+        "..a import y\nimport numpy"
+    )
     names = imported(source, "app.sub")
     assert names == {"renderer.gl", "stimuli.build", "stimuli.study", "app.x", "app.a.y", "numpy"}
     assert forbidden(names, "app", MAY_IMPORT["app"]) == {"renderer.gl", "stimuli.build"}
@@ -49,10 +65,22 @@ def test_imports(path):
     relative = path.relative_to(ROOT)
     package = relative.parts[0]
     allowed = MAY_IMPORT[package]
-    if relative.parent.as_posix() == "app/commands":  # a verb hands over to the stage that has its name
-        allowed = allowed | {f"stimuli.{relative.stem}"} | ({"renderer", "stimuli.heads"} if relative.stem == "render" else set())
-        allowed |= {"renderer.errors", "renderer.medium", "renderer.profiles"} if relative.stem in PROFILE_VERBS else set()
-    assert not forbidden(imported(path.read_text(), ".".join(relative.parts[:-1])), package, allowed)
+    if (
+        relative.parent.as_posix() == "app/commands"
+    ):  # a verb hands over to the stage that has its name
+        allowed = (
+            allowed
+            | {f"stimuli.{relative.stem}"}
+            | ({"renderer", "stimuli.heads"} if relative.stem == "render" else set())
+        )
+        allowed |= (
+            {"renderer.errors", "renderer.medium", "renderer.profiles"}
+            if relative.stem in PROFILE_VERBS
+            else set()
+        )
+    assert not forbidden(
+        imported(path.read_text(), ".".join(relative.parts[:-1])), package, allowed
+    )
 
 
 def test_application_never_imports_opengl():
@@ -63,17 +91,38 @@ def test_application_never_imports_opengl():
         if "migrations" not in path.parts
     ]
     assert {"app", "app.cli", "app.commands.serve", "app.commands.render"} <= set(names)
-    program = "import sys, importlib\nfor name in sys.argv[1:]: importlib.import_module(name)\nprint(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program, *names], cwd=ROOT, capture_output=True, text=True, check=True)
+    program = (
+        "import sys, importlib\nfor name in sys.argv[1:]: "
+        "importlib.import_module(name)\nprint(*sys.modules)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program, *names],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     modules = set(run.stdout.split())
     assert "flask" in modules
     assert not modules & {"OpenGL", "pyrender", "pyglet", "renderer"}
 
 
 def test_profiles_never_import_opengl():
-    names = [f"renderer.profiles.{path.stem}" for path in sorted((ROOT / "renderer/profiles").glob("[!_]*.py"))]
-    program = "import sys, importlib\nfor name in sys.argv[1:]: importlib.import_module(name)\nprint(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program, "renderer.medium", *names], cwd=ROOT, capture_output=True, text=True, check=True)
+    names = [
+        f"renderer.profiles.{path.stem}"
+        for path in sorted((ROOT / "renderer/profiles").glob("[!_]*.py"))
+    ]
+    program = (
+        "import sys, importlib\nfor name in sys.argv[1:]: "
+        "importlib.import_module(name)\nprint(*sys.modules)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program, "renderer.medium", *names],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert not set(run.stdout.split()) & {"OpenGL", "pyrender", "pyglet", "trimesh", "matplotlib"}
 
 
@@ -81,6 +130,10 @@ def test_profiles_never_import_opengl():
 def test_renderer_needs_no_x_server():
     """pyrender's viewer, which is imported with it, must not look for the libraries of a screen."""
     program = "import sys, renderer.scene; print(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     modules = set(run.stdout.split())
-    assert "pyrender.viewer" in modules and not any(name.startswith("pyglet.libs.x11") for name in modules)
+    assert "pyrender.viewer" in modules and not any(
+        name.startswith("pyglet.libs.x11") for name in modules
+    )

@@ -21,7 +21,9 @@ def test_every_option_has_help(verb):
     assert command.help and command.help.rstrip().endswith(".")
     for parameter in command.params:
         if isinstance(parameter, click.Option):
-            assert parameter.help and len(parameter.help) > 10, f"{verb} {parameter.opts[0]} has no help text"
+            assert parameter.help and len(parameter.help) > 10, (
+                f"{verb} {parameter.opts[0]} has no help text"
+            )
         else:
             assert parameter.make_metavar(click.Context(command)).strip("[].") in command.help
 
@@ -49,8 +51,17 @@ def test_version(run):
 def test_help_loads_nothing_heavy():
     """So that `subdermal --help` answers at once."""
     program = "import sys; from app.cli import main; main(['--help']); print(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert not set(run.stdout.split()) & {"numpy", "pandas", "sqlalchemy", "matplotlib", "OpenGL", "trimesh"}
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not set(run.stdout.split()) & {
+        "numpy",
+        "pandas",
+        "sqlalchemy",
+        "matplotlib",
+        "OpenGL",
+        "trimesh",
+    }
 
 
 @pytest.mark.parametrize(
@@ -68,9 +79,29 @@ def test_help_loads_nothing_heavy():
         ["simulate", ".", "--participants", "none"],
         ["analyse", "no.csv", "--out", "out"],
         ["analyse", "bad.toml", "--out", "out"],
-        ["render", "--technique", "no", "--framing", "close-up", "--size", "64x64", "--out", "a.png"],
+        [
+            "render",
+            "--technique",
+            "no",
+            "--framing",
+            "close-up",
+            "--size",
+            "64x64",
+            "--out",
+            "a.png",
+        ],
         ["render", "--technique", "none", "--framing", "no", "--size", "64x64", "--out", "a.png"],
-        ["render", "--technique", "none", "--framing", "close-up", "--size", "64", "--out", "a.png"],
+        [
+            "render",
+            "--technique",
+            "none",
+            "--framing",
+            "close-up",
+            "--size",
+            "64",
+            "--out",
+            "a.png",
+        ],
     ],
     ids=" ".join,
 )
@@ -84,7 +115,10 @@ def test_bad_input_gives_one_line_and_exit_code_2(run, tmp_path, args):
 
 def test_toml_fault_names_its_line(run, tmp_path):
     (tmp_path / "bad.toml").write_text('name = "x"\nseed = = 1\n')
-    assert "bad.toml: not TOML" in (err := run("build", "bad.toml", "--out", "out")[2]) and "line 2" in err
+    assert (
+        "bad.toml: not TOML" in (err := run("build", "bad.toml", "--out", "out")[2])
+        and "line 2" in err
+    )
 
 
 def raising(error):
@@ -99,7 +133,11 @@ def raising(error):
     ("error", "code", "message"),
     [
         (click.UsageError("two\nlines"), 2, "two lines"),
-        (OSError(28, "No space left on device", "a.png"), 1, "[Errno 28] No space left on device: 'a.png'"),
+        (
+            OSError(28, "No space left on device", "a.png"),
+            1,
+            "[Errno 28] No space left on device: 'a.png'",
+        ),
         (KeyboardInterrupt(), 130, "stopped"),
     ],
 )
@@ -107,11 +145,19 @@ def test_what_a_user_can_cause_is_one_line(run, monkeypatch, error, code, messag
     monkeypatch.setitem(VERBS, "fail", raising(error))
     monkeypatch.setattr(cli.cli, "get_command", lambda ctx, name: VERBS[name])
     got, _, err = run("fail")
-    assert got == code and err.strip().startswith(f"subdermal: {message}") and err.strip().count("\n") == 0
+    assert (
+        got == code
+        and err.strip().startswith(f"subdermal: {message}")
+        and err.strip().count("\n") == 0
+    )
 
 
 def test_defects_and_asked_for_tracebacks_are_not_hidden(run, monkeypatch):
-    monkeypatch.setattr(cli.cli, "get_command", lambda ctx, name: raising(ZeroDivisionError() if name == "fail" else OSError(1)))
+    monkeypatch.setattr(
+        cli.cli,
+        "get_command",
+        lambda ctx, name: raising(ZeroDivisionError() if name == "fail" else OSError(1)),
+    )
     with pytest.raises(ZeroDivisionError):
         run("fail")
     with pytest.raises(OSError):

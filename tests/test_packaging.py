@@ -1,4 +1,6 @@
-"""The lock: pinned, hashed, without addresses, and nothing that pyproject.toml asks for is missing."""
+"""The lock: pinned, hashed, without addresses, and nothing that pyproject.toml asks for is
+missing.
+"""
 
 import re
 import tomllib

@@ -10,7 +10,9 @@ import click
 SHOWN_ROWS = 20
 
 
-def names(ctx: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+def names(
+    ctx: click.Context, parameter: click.Parameter, value: str | None
+) -> tuple[str, ...] | None:
     """'a, b,c' as ('a', 'b', 'c')."""
     return None if value is None else tuple(name.strip() for name in value.split(","))
 
@@ -27,44 +29,91 @@ def names(ctx: click.Context, parameter: click.Parameter, value: str | None) -> 
     "--order",
     callback=names,
     metavar="A,B,C",
-    help="Every technique once: the order in which medians are taken. Without it the study's, or that of first appearance.",
+    help=(
+        "Every technique once: the order in which medians are taken. Without it the "
+        "study's, or that of first appearance."
+    ),
 )
 @click.option(
     "--pair",
     callback=names,
     metavar="A,B",
-    help="The two techniques of the box plot. Without it golubev,golubev_plus where both are there, else the first two.",
+    help=(
+        "The two techniques of the box plot. Without it golubev,golubev_plus where both are "
+        "there, else the first two."
+    ),
 )
 @click.option(
     "--study",
     type=click.Path(path_type=Path),
     metavar="MANIFEST",
-    help="The study's manifest.json, or its folder, for labels and order. Without it the manifest.json beside RESPONSES, if any.",
+    help=(
+        "The study's manifest.json, or its folder, for labels and order. Without it the "
+        "manifest.json beside RESPONSES, if any."
+    ),
 )
 @click.option(
     "--matrices",
     type=click.Path(path_type=Path),
     metavar="FILE.toml",
-    help="Instead of RESPONSES: `items = [names]` and for each framing `[matrix.NAME]` with `rows = [[1, 0.5, ...], ...]`.",
+    help=(
+        "Instead of RESPONSES: `items = [names]` and for each framing `[matrix.NAME]` with "
+        "`rows = [[1, 0.5, ...], ...]`."
+    ),
 )
 @click.option(
     "--factor",
     metavar="COLUMN",
-    help="Group the answers by this column of RESPONSES, such as lighting or familiarity. Without it by framing.",
+    help=(
+        "Group the answers by this column of RESPONSES, such as lighting or familiarity. "
+        "Without it by framing."
+    ),
 )
 @click.option(
     "--reference",
     default="reference",
     show_default=True,
-    help="The technique whose images are the reference: with a manifest, DSSIM to them is set beside worth.",
+    help=(
+        "The technique whose images are the reference: with a manifest, DSSIM to them is "
+        "set beside worth."
+    ),
 )
-@click.option("--margin", type=float, help="As good as each other: within this many points of 0, on the scale from -2 to 2. Else as declared.")
-@click.option("--margin-jod", type=float, help="The same in JOD. Without it as the study declares, or none.")
-@click.option("--test", type=click.Choice(["wilcoxon", "sign"]), help="The declared test. Without it as the study declares, or wilcoxon.")
-@click.option("--family", type=click.Choice(["study", "framing"]), help="Pairs that Holm's correction guards together: of all framings, or of each.")
-@click.option("--resamples", type=int, help="How often participants are resampled. Without it as the study declares, or 1000.")
-@click.option("--seed", type=int, help="Draws the resamples; the same seed gives the same numbers. Without it as declared, or 0.")
-@click.option("--level", type=float, help="Level of the intervals, 0.95 without it; tests are at one less this level.")
+@click.option(
+    "--margin",
+    type=float,
+    help=(
+        "As good as each other: within this many points of 0, on the scale from -2 to 2. "
+        "Else as declared."
+    ),
+)
+@click.option(
+    "--margin-jod", type=float, help="The same in JOD. Without it as the study declares, or none."
+)
+@click.option(
+    "--test",
+    type=click.Choice(["wilcoxon", "sign"]),
+    help="The declared test. Without it as the study declares, or wilcoxon.",
+)
+@click.option(
+    "--family",
+    type=click.Choice(["study", "framing"]),
+    help="Pairs that Holm's correction guards together: of all framings, or of each.",
+)
+@click.option(
+    "--resamples",
+    type=int,
+    help="How often participants are resampled. Without it as the study declares, or 1000.",
+)
+@click.option(
+    "--seed",
+    type=int,
+    help="Draws the resamples; the same seed gives the same numbers. Without it as declared, or 0.",
+)
+@click.option(
+    "--level",
+    type=float,
+    help="Level of the intervals, 0.95 without it; tests are at one less this level.",
+)
 def command(
     responses: Path | None,
     out: Path,
@@ -94,7 +143,9 @@ def command(
         given = {"--order": order, "--pair": pair, "--study": study, "--factor": factor, **given}
         unused = [option for option, value in given.items() if value is not None]
         if unused:
-            raise click.UsageError(f"{', '.join(unused)} cannot go with --matrices, which has its own names and order")
+            raise click.UsageError(
+                f"{', '.join(unused)} cannot go with --matrices, which has its own names and order"
+            )
         found = read_matrices(matrices)
         files = report_matrices(found, matrices.name, _written(("--matrices", matrices.name)))
         write_files(files, out)
@@ -110,9 +161,17 @@ def command(
             notes = ("The manifest.json beside the table is not one of a study; it was not used.",)
     answers = read_responses(responses, study and read_manifest(study), order, factor or FRAMING)
     answers = replace(answers, notes=notes + answers.notes)
-    options = [(option, ",".join(value)) for option, value in (("--order", order), ("--pair", pair)) if value]
+    options = [
+        (option, ",".join(value))
+        for option, value in (("--order", order), ("--pair", pair))
+        if value
+    ]
     options += [("--factor", factor)] if factor else []
-    options += [(f"--{name.replace('_', '-')}", str(value)) for name, value in choices.items() if value is not None]
+    options += [
+        (f"--{name.replace('_', '-')}", str(value))
+        for name, value in choices.items()
+        if value is not None
+    ]
     if study is not None:
         options.append(("--study", study.name))
     declared = declarations.read_declared(study) if study is not None else {}
@@ -135,7 +194,11 @@ def command(
     kind = "simulated answers" if answers.simulated else "answers"
     click.echo(
         f"{out / 'report.html'}: {len(answers.frame)} {kind} of {answers.participants} participants"
-        + (f"; {unused} of {answers.rows} rows not used, see {out / 'tables/rejected_rows.csv'}" if unused else "")
+        + (
+            f"; {unused} of {answers.rows} rows not used, see {out / 'tables/rejected_rows.csv'}"
+            if unused
+            else ""
+        )
     )
 
 
@@ -149,5 +212,9 @@ def _source(declared: dict, choices: dict) -> str:
 
 
 def _written(*parts: tuple[str, ...]) -> str:
-    """The command as it is shown in the report: without folders, so that it says nothing of the machine and never changes."""
-    return shlex.join(["subdermal", "analyse", *(word for part in parts for word in part), "--out", "DIR"])
+    """The command as it is shown in the report: without folders, so that it says nothing of the
+    machine and never changes.
+    """
+    return shlex.join(
+        ["subdermal", "analyse", *(word for part in parts for word in part), "--out", "DIR"]
+    )

@@ -14,22 +14,50 @@ import click
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the images and manifest.json; made when it is not there.",
 )
-@click.option("--head", help='Head to show instead of the one that STUDY names: "default", or a scan, FILE.glb or FILE.obj.')
-@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the scan's coordinates; guessed, and said, when not given.")
-@click.option("--up", type=click.Choice(["y", "z"]), help="The scan's upward axis; found out, and said, when not given.")
+@click.option(
+    "--head",
+    help=(
+        'Head to show instead of the one that STUDY names: "default", or a scan, FILE.glb '
+        "or FILE.obj."
+    ),
+)
+@click.option(
+    "--unit",
+    type=click.Choice(["mm", "cm", "m", "in"]),
+    help="Unit of the scan's coordinates; guessed, and said, when not given.",
+)
+@click.option(
+    "--up",
+    type=click.Choice(["y", "z"]),
+    help="The scan's upward axis; found out, and said, when not given.",
+)
 @click.option(
     "--time",
     "rounds",
     type=click.IntRange(0, 100),
     default=0,
     show_default=True,
-    help="Also time every technique so often and write the median milliseconds into the manifest; 0: do not.",
+    help=(
+        "Also time every technique so often and write the median milliseconds into the "
+        "manifest; 0: do not."
+    ),
 )
-@click.option("--force", is_flag=True, help="Render every image anew, also those that are up to date.")
-def command(study: Path, out: Path, head: str | None, unit: str | None, up: str | None, rounds: int, force: bool) -> None:
+@click.option(
+    "--force", is_flag=True, help="Render every image anew, also those that are up to date."
+)
+def command(
+    study: Path,
+    out: Path,
+    head: str | None,
+    unit: str | None,
+    up: str | None,
+    rounds: int,
+    force: bool,
+) -> None:
     """Render the images of the study defined in STUDY, a TOML file, and write their manifest.
 
-    Only what changed since the last build is rendered, and an interrupted build goes on where it stopped.
+    Only what changed since the last build is rendered, and an interrupted build goes on where it
+    stopped.
     """
     from stimuli.build import build
     from stimuli.study import load_study
@@ -40,4 +68,7 @@ def command(study: Path, out: Path, head: str | None, unit: str | None, up: str 
     built = build(definition, out, force=force, progress=True, rounds=rounds)
     for note in built.notes:
         click.echo(note, err=True)
-    click.echo(f"{out}: {built.rendered + built.kept} images, {built.rendered} rendered, {built.kept} up to date")
+    click.echo(
+        f"{out}: {built.rendered + built.kept} images, {built.rendered} rendered, "
+        f"{built.kept} up to date"
+    )

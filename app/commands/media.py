@@ -27,16 +27,62 @@ class Numbers(click.ParamType):
 NUMBERS = Numbers()
 
 OPTIONS = (
-    click.option("--medium", metavar="NAME", help="A preset: skin1, marble, skin_three_layers, ...; an unknown name lists them all."),
-    click.option("--sigma-a", type=NUMBERS, help="Absorption in 1/mm per channel, instead of --medium."),
-    click.option("--sigma-s-prime", type=NUMBERS, help="Reduced scattering in 1/mm per channel, instead of --medium."),
-    click.option("--eta", type=float, help="Index of refraction of the medium given by numbers; 1.3 if not given."),
-    click.option("--g", type=float, help="Mean cosine of scattering of the medium given by numbers, for montecarlo; 0 if not given."),
-    click.option("--thickness", type=float, metavar="MM", help="Thickness of the slab in mm; a half-space if not given."),
-    click.option("--n-below", type=float, default=1.0, show_default=True, help="Index of refraction under the slab."),
-    click.option("--roughness", type=float, default=0.0, show_default=True, help="Beckmann slope of the lit face, 0 to 1 (dipole, multipole, layered, gaussian_sum)."),
-    click.option("--layer", "layers", multiple=True, metavar='"sigma_a=R,G,B sigma_s_prime=R,G,B eta=N d=MM"',
-                 help="A layer, from the lit face down; repeat for more, instead of --medium. g=G may be added; without d it is infinite."),
+    click.option(
+        "--medium",
+        metavar="NAME",
+        help="A preset: skin1, marble, skin_three_layers, ...; an unknown name lists them all.",
+    ),
+    click.option(
+        "--sigma-a", type=NUMBERS, help="Absorption in 1/mm per channel, instead of --medium."
+    ),
+    click.option(
+        "--sigma-s-prime",
+        type=NUMBERS,
+        help="Reduced scattering in 1/mm per channel, instead of --medium.",
+    ),
+    click.option(
+        "--eta",
+        type=float,
+        help="Index of refraction of the medium given by numbers; 1.3 if not given.",
+    ),
+    click.option(
+        "--g",
+        type=float,
+        help=(
+            "Mean cosine of scattering of the medium given by numbers, for montecarlo; 0 if "
+            "not given."
+        ),
+    ),
+    click.option(
+        "--thickness",
+        type=float,
+        metavar="MM",
+        help="Thickness of the slab in mm; a half-space if not given.",
+    ),
+    click.option(
+        "--n-below",
+        type=float,
+        default=1.0,
+        show_default=True,
+        help="Index of refraction under the slab.",
+    ),
+    click.option(
+        "--roughness",
+        type=float,
+        default=0.0,
+        show_default=True,
+        help="Beckmann slope of the lit face, 0 to 1 (dipole, multipole, layered, gaussian_sum).",
+    ),
+    click.option(
+        "--layer",
+        "layers",
+        multiple=True,
+        metavar='"sigma_a=R,G,B sigma_s_prime=R,G,B eta=N d=MM"',
+        help=(
+            "A layer, from the lit face down; repeat for more, instead of --medium. g=G may "
+            "be added; without d it is infinite."
+        ),
+    ),
 )
 
 
@@ -55,15 +101,25 @@ def _layer(text: str):
     for item in text.split():
         name, equals, value = item.partition("=")
         if not equals or name not in ("sigma_a", "sigma_s_prime", "eta", "g", "d"):
-            raise InputError(f"--layer: got {item!r}; expected sigma_a=, sigma_s_prime=, eta=, g= or d=")
+            raise InputError(
+                f"--layer: got {item!r}; expected sigma_a=, sigma_s_prime=, eta=, g= or d="
+            )
         try:
-            given[name] = NUMBERS.convert(value, None, None) if name.startswith("sigma") else float(value)
+            given[name] = (
+                NUMBERS.convert(value, None, None) if name.startswith("sigma") else float(value)
+            )
         except ValueError:
             raise InputError(f"--layer: {name} is {value!r}; expected a number") from None
     missing = [name for name in ("sigma_a", "sigma_s_prime") if name not in given]
     if missing:
         raise InputError(f"--layer {text!r}: there is no {missing[0]}")
-    medium = Medium(given["sigma_a"], given["sigma_s_prime"], given.get("eta", 1.3), given.get("g", 0.0), name="layer")
+    medium = Medium(
+        given["sigma_a"],
+        given["sigma_s_prime"],
+        given.get("eta", 1.3),
+        given.get("g", 0.0),
+        name="layer",
+    )
     return Layer(medium, given.get("d", float("inf")))
 
 
@@ -76,9 +132,20 @@ def stack_of(medium, sigma_a, sigma_s_prime, eta, g, thickness, n_below, roughne
 
     by_numbers = {"--sigma-a": sigma_a, "--sigma-s-prime": sigma_s_prime, "--eta": eta, "--g": g}
     numbers = [name for name, value in by_numbers.items() if value is not None]
-    ways = [way for way, used in (("--medium", medium is not None), (", ".join(numbers), numbers), ("--layer", layers)) if used]
+    ways = [
+        way
+        for way, used in (
+            ("--medium", medium is not None),
+            (", ".join(numbers), numbers),
+            ("--layer", layers),
+        )
+        if used
+    ]
     if len(ways) != 1:
-        raise InputError(f"got {' and '.join(ways) or 'no medium'}; expected --medium NAME, or --sigma-a and --sigma-s-prime, or --layer")
+        raise InputError(
+            f"got {' and '.join(ways) or 'no medium'}; expected --medium NAME, or --sigma-a "
+            "and --sigma-s-prime, or --layer"
+        )
     if layers:
         stack = Stack(tuple(_layer(text) for text in layers), name="layers")
     elif medium is not None:
@@ -87,7 +154,15 @@ def stack_of(medium, sigma_a, sigma_s_prime, eta, g, thickness, n_below, roughne
         for name in ("--sigma-a", "--sigma-s-prime"):
             if by_numbers[name] is None:
                 raise InputError(f"there is no {name}; expected it with {numbers[0]}")
-        stack = Stack.of(Medium(sigma_a, sigma_s_prime, 1.3 if eta is None else eta, 0.0 if g is None else g, name="medium"))
+        stack = Stack.of(
+            Medium(
+                sigma_a,
+                sigma_s_prime,
+                1.3 if eta is None else eta,
+                0.0 if g is None else g,
+                name="medium",
+            )
+        )
     if thickness is not None:
         if len(stack.layers) > 1 or layers:
             raise InputError("--thickness is for one medium; expected d= in each --layer")

@@ -9,12 +9,16 @@ from pathlib import Path
 import click
 
 
-def names(ctx: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+def names(
+    ctx: click.Context, parameter: click.Parameter, value: str | None
+) -> tuple[str, ...] | None:
     """'a, b' as ('a', 'b')."""
     return None if value is None else tuple(name.strip() for name in value.split(","))
 
 
-def worths(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
+def worths(
+    ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> dict[str, float]:
     """('a=0.3', 'b=-1') as {'a': 0.3, 'b': -1}."""
     found = {}
     for text in values:
@@ -28,43 +32,119 @@ def worths(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
 
 @click.command()
 @click.argument("study", metavar="STUDY.toml", type=click.Path(dir_okay=False, path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for power.csv, needed.csv, power.md and the figure.")
 @click.option(
-    "--difference", type=float, metavar="JOD",
-    help="To find, or to exclude: at 1 JOD 75 % of answers prefer one of the two. Without it the study's margin_jod, or 0.5.",
-)  # fmt: skip
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Folder for power.csv, needed.csv, power.md and the figure.",
+)
 @click.option(
-    "--pair", callback=names, metavar="A,B",
-    help="The two techniques. Without it golubev,golubev_plus where the study has both, else its first two.",
-)  # fmt: skip
+    "--difference",
+    type=float,
+    metavar="JOD",
+    help=(
+        "To find, or to exclude: at 1 JOD 75 % of answers prefer one of the two. Without it "
+        "the study's margin_jod, or 0.5."
+    ),
+)
 @click.option(
-    "--worth", "assumed", multiple=True, callback=worths, metavar="TECHNIQUE=JOD",
-    help="An assumed worth, repeated for each technique; what is not named is 0. The pair is set its difference apart about its middle.",
-)  # fmt: skip
+    "--pair",
+    callback=names,
+    metavar="A,B",
+    help=(
+        "The two techniques. Without it golubev,golubev_plus where the study has both, else "
+        "its first two."
+    ),
+)
 @click.option(
-    "--pilot", type=click.Path(path_type=Path), metavar="RESPONSES.csv",
+    "--worth",
+    "assumed",
+    multiple=True,
+    callback=worths,
+    metavar="TECHNIQUE=JOD",
+    help=(
+        "An assumed worth, repeated for each technique; what is not named is 0. The pair is "
+        "set its difference apart about its middle."
+    ),
+)
+@click.option(
+    "--pilot",
+    type=click.Path(path_type=Path),
+    metavar="RESPONSES.csv",
     help="Take worths and thresholds from a pilot's answers instead, framing by framing.",
-)  # fmt: skip
+)
 @click.option(
-    "--design", "designs", multiple=True, type=click.Choice(["full", "incomplete", "adaptive"]),
-    help="Repeated for several: every pair of everyone; some pairs by lot; those from which most is learnt. Without it all three.",
-)  # fmt: skip
+    "--design",
+    "designs",
+    multiple=True,
+    type=click.Choice(["full", "incomplete", "adaptive"]),
+    help=(
+        "Repeated for several: every pair of everyone; some pairs by lot; those from which "
+        "most is learnt. Without it all three."
+    ),
+)
 @click.option(
-    "--answers", default=0, type=int, metavar="N",
-    help="Pairs that the incomplete and the adaptive design ask each person at a framing. Without it half of them.",
-)  # fmt: skip
-@click.option("--slight", type=float, metavar="JOD", help="Below this a person sees no difference: 0.5 without it, or the pilot's.")
-@click.option("--clear", type=float, metavar="JOD", help="From here on a preference is a clear one: 1.8 without it, or the pilot's.")
-@click.option("--taste", type=float, metavar="JOD", help="Spread between people of what they feel of one difference: 0.5 without it.")
-@click.option("--alpha", type=float, help="Level of each test. Without it one less the study's level, or 0.05.")
-@click.option("--power", "wanted", default=0.8, show_default=True, type=float, help="The power to reach.")
+    "--answers",
+    default=0,
+    type=int,
+    metavar="N",
+    help=(
+        "Pairs that the incomplete and the adaptive design ask each person at a framing. "
+        "Without it half of them."
+    ),
+)
 @click.option(
-    "--family", type=int, metavar="N",
-    help="Tests that Holm's correction guards together: its first step, alpha/N, is shown too. Without it all pairs of all framings.",
-)  # fmt: skip
-@click.option("--most", default=400, show_default=True, type=int, help="The most people to think of.")
-@click.option("--studies", default=1000, show_default=True, type=int, help="Simulated studies for each design and framing.")
-@click.option("--seed", default=1, show_default=True, type=int, help="Draws the simulated people; the same seed gives the same files.")
+    "--slight",
+    type=float,
+    metavar="JOD",
+    help="Below this a person sees no difference: 0.5 without it, or the pilot's.",
+)
+@click.option(
+    "--clear",
+    type=float,
+    metavar="JOD",
+    help="From here on a preference is a clear one: 1.8 without it, or the pilot's.",
+)
+@click.option(
+    "--taste",
+    type=float,
+    metavar="JOD",
+    help="Spread between people of what they feel of one difference: 0.5 without it.",
+)
+@click.option(
+    "--alpha",
+    type=float,
+    help="Level of each test. Without it one less the study's level, or 0.05.",
+)
+@click.option(
+    "--power", "wanted", default=0.8, show_default=True, type=float, help="The power to reach."
+)
+@click.option(
+    "--family",
+    type=int,
+    metavar="N",
+    help=(
+        "Tests that Holm's correction guards together: its first step, alpha/N, is shown "
+        "too. Without it all pairs of all framings."
+    ),
+)
+@click.option(
+    "--most", default=400, show_default=True, type=int, help="The most people to think of."
+)
+@click.option(
+    "--studies",
+    default=1000,
+    show_default=True,
+    type=int,
+    help="Simulated studies for each design and framing.",
+)
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=int,
+    help="Draws the simulated people; the same seed gives the same files.",
+)
 def command(
     study: Path,
     out: Path,
@@ -86,22 +166,24 @@ def command(
 ) -> None:
     """Say how many people the study in STUDY.toml needs to find, or to exclude, a difference.
 
-    Participants are simulated from assumed worths or from a pilot, and their answers tested as `subdermal
-    analyse` does. Nothing here is an answer of a person.
+    Participants are simulated from assumed worths or from a pilot, and their answers tested as
+    `subdermal analyse` does. Nothing here is an answer of a person.
     """
     from stimuli.study import load_study
 
     definition = load_study(study)
     techniques = tuple(condition.name for condition in definition.techniques)
     if unknown := [name for name in assumed if name not in techniques]:
-        raise click.UsageError(f"--worth names {', '.join(unknown)}; expected one of {', '.join(techniques)}")
+        raise click.UsageError(
+            f"--worth names {', '.join(unknown)}; expected one of {', '.join(techniques)}"
+        )
     if assumed and pilot:
         raise click.UsageError("expected either --worth or --pilot: the pilot gives the worths")
 
     from tqdm import tqdm
 
     from analysis.codebook import Codebook
-    from analysis.power import Answering, DESIGNS, Plan, fit_pilot, plan_table, power_files
+    from analysis.power import DESIGNS, Answering, Plan, fit_pilot, plan_table, power_files
     from analysis.report import write_files
     from analysis.responses import read_responses
 
@@ -115,7 +197,10 @@ def command(
         | {("technique", condition.name): condition.label for condition in definition.techniques},
         title=definition.title,
     )
-    answering, table = Answering(), {"any": {name: assumed.get(name, 0.0) for name in techniques}} if assumed else {}
+    answering, table = (
+        Answering(),
+        {"any": {name: assumed.get(name, 0.0) for name in techniques}} if assumed else {},
+    )
     source = "assumed"
     if pilot is not None:
         responses = read_responses(pilot, codebook)
@@ -123,9 +208,14 @@ def command(
             click.echo(f"{pilot}: {finding}", err=True)
         table, answering = fit_pilot(responses)
         kind = "simulated participants" if responses.simulated else "participants"
-        source = f"fitted to the pilot {pilot.name}, {len(responses.frame)} answers of {responses.participants} {kind}"
+        source = (
+            f"fitted to the pilot {pilot.name}, {len(responses.frame)} answers of "
+            f"{responses.participants} {kind}"
+        )
     given = {"slight": slight, "clear": clear, "taste": taste}
-    answering = replace(answering, **{name: value for name, value in given.items() if value is not None})
+    answering = replace(
+        answering, **{name: value for name, value in given.items() if value is not None}
+    )
     known = ("golubev", "golubev_plus")
     plan = Plan(
         techniques=techniques,
@@ -142,7 +232,11 @@ def command(
         seed=seed,
     )
     designs = designs or DESIGNS
-    curves, needed = plan_table(plan, designs, lambda steps: tqdm(steps, desc="simulated studies", unit="design", disable=None))
+    curves, needed = plan_table(
+        plan,
+        designs,
+        lambda steps: tqdm(steps, desc="simulated studies", unit="design", disable=None),
+    )
     files, sentences = power_files(plan, curves, needed, codebook, source, _written(study))
     write_files(files, out)
     for sentence in sentences:
@@ -150,13 +244,16 @@ def command(
     click.echo(f"{out / 'power.md'}: {studies} simulated studies for each design, seed {seed}")
 
 
-
 def _written(study: Path) -> str:
-    """The command as the page shows it: what was given, without folders, so that it says nothing of the machine."""
+    """The command as the page shows it: what was given, without folders, so that it says nothing of
+    the machine.
+    """
     context = click.get_current_context()
     words = ["subdermal", "power", study.name]
     for parameter in context.command.params:
-        given = context.get_parameter_source(parameter.name) is click.core.ParameterSource.COMMANDLINE
+        given = (
+            context.get_parameter_source(parameter.name) is click.core.ParameterSource.COMMANDLINE
+        )
         if isinstance(parameter, click.Option) and given and parameter.name != "out":
             value = context.params[parameter.name]
             if isinstance(value, dict):

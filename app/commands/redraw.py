@@ -7,14 +7,38 @@ import click
 
 @click.command("redraw")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--figure", "-f", "wanted", multiple=True, metavar="NAME",
-              help="One of 001-4.4, 001-4.5, 001-4.6, 000-2.14, 000-2.15, 000-2.17, 000-3.5, 000-3.6, translucency; repeat for more. All if not given.")
-@click.option("--format", "suffix", type=click.Choice(["svg", "png"]), default="svg", show_default=True, help="Kind of the files.")
-@click.option("--photons", type=click.IntRange(1000), default=1_000_000, show_default=True, help="Photons of the three figures that need Monte Carlo.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the photons.")
+@click.option(
+    "--figure",
+    "-f",
+    "wanted",
+    multiple=True,
+    metavar="NAME",
+    help=(
+        "One of 001-4.4, 001-4.5, 001-4.6, 000-2.14, 000-2.15, 000-2.17, 000-3.5, 000-3.6, "
+        "translucency; repeat for more. All if not given."
+    ),
+)
+@click.option(
+    "--format",
+    "suffix",
+    type=click.Choice(["svg", "png"]),
+    default="svg",
+    show_default=True,
+    help="Kind of the files.",
+)
+@click.option(
+    "--photons",
+    type=click.IntRange(1000),
+    default=1_000_000,
+    show_default=True,
+    help="Photons of the three figures that need Monte Carlo.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the photons."
+)
 def command(folder, wanted, suffix, photons, seed):
-    """Draw the documents' figures of profiles again into DIR: dipole and multipole of marble (Rohat), Burley's fits against Monte
-    Carlo, guided kernels and the artist's Gaussians (Vuletic).
+    """Draw the documents' figures of profiles again into DIR: dipole and multipole of marble
+    (Rohat), Burley's fits against Monte Carlo, guided kernels and the artist's Gaussians (Vuletic).
 
     With a million photons the three figures that need them take about a minute.
     """
@@ -28,4 +52,4 @@ def command(folder, wanted, suffix, photons, seed):
     for name in wanted or figures.FIGURES:
         path = folder / f"{name}.{suffix}"
         figures.save(figures.FIGURES[name](photons, seed), path)
-        click.echo(f"{path}: {figures.FIGURES[name].__doc__}")
+        click.echo(f"{path}: {' '.join(figures.FIGURES[name].__doc__.split())}")

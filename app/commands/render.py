@@ -39,21 +39,90 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 @click.command("render")
-@click.option("--technique", "-t", required=True, help="The technique, by its name in studies (none, golubev, ...).")
-@click.option("--framing", "-f", default="close-up", show_default=True, help="close-up, head-shot or half-length.")
-@click.option("--size", "-s", default="1920x1080", show_default=True, metavar=SIZE, callback=_size, help="Size of the image in pixels.")
-@click.option("--out", "-o", required=True, type=click.Path(dir_okay=False, path_type=Path), help="The PNG file to write.")
-@click.option("--parameter", "-p", "parameters", multiple=True, metavar="NAME=VALUE", callback=_parameter,
-              help="A parameter of the technique, value in JSON; repeat for more.")
-@click.option("--head", default="default", show_default=True, help="The default head, or a scan as .glb, .gltf or .obj.")
-@click.option("--unit", type=click.Choice(["mm", "cm", "m", "in"]), help="Unit of the scan's coordinates; guessed and said if not given.")
-@click.option("--up", type=click.Choice(["y", "z"]), help="The scan's upward axis; found out and said if not given.")
-@click.option("--supersample", type=click.IntRange(1, 4), default=2, show_default=True, help="Samples a pixel along each side.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of hair, skin noise and baked light.")
-@click.option("--samples", type=click.Path(dir_okay=False, path_type=Path),
-              help="Also write the samples of each pixel, .npy, uint8 at the resolution at which scattering is computed; 0 where nothing scatters.")
-@click.option("--contrast", type=click.Path(dir_okay=False, path_type=Path), help="Also write the local contrast as a grey PNG (golubev_plus).")
-def command(technique, framing, size, out, parameters, head, unit, up, supersample, seed, samples, contrast):
+@click.option(
+    "--technique",
+    "-t",
+    required=True,
+    help="The technique, by its name in studies (none, golubev, ...).",
+)
+@click.option(
+    "--framing",
+    "-f",
+    default="close-up",
+    show_default=True,
+    help="close-up, head-shot or half-length.",
+)
+@click.option(
+    "--size",
+    "-s",
+    default="1920x1080",
+    show_default=True,
+    metavar=SIZE,
+    callback=_size,
+    help="Size of the image in pixels.",
+)
+@click.option(
+    "--out",
+    "-o",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The PNG file to write.",
+)
+@click.option(
+    "--parameter",
+    "-p",
+    "parameters",
+    multiple=True,
+    metavar="NAME=VALUE",
+    callback=_parameter,
+    help="A parameter of the technique, value in JSON; repeat for more.",
+)
+@click.option(
+    "--head",
+    default="default",
+    show_default=True,
+    help="The default head, or a scan as .glb, .gltf or .obj.",
+)
+@click.option(
+    "--unit",
+    type=click.Choice(["mm", "cm", "m", "in"]),
+    help="Unit of the scan's coordinates; guessed and said if not given.",
+)
+@click.option(
+    "--up",
+    type=click.Choice(["y", "z"]),
+    help="The scan's upward axis; found out and said if not given.",
+)
+@click.option(
+    "--supersample",
+    type=click.IntRange(1, 4),
+    default=2,
+    show_default=True,
+    help="Samples a pixel along each side.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Seed of hair, skin noise and baked light.",
+)
+@click.option(
+    "--samples",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help=(
+        "Also write the samples of each pixel, .npy, uint8 at the resolution at which "
+        "scattering is computed; 0 where nothing scatters."
+    ),
+)
+@click.option(
+    "--contrast",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Also write the local contrast as a grey PNG (golubev_plus).",
+)
+def command(
+    technique, framing, size, out, parameters, head, unit, up, supersample, seed, samples, contrast
+):
     """Render one technique at one framing.
 
     Prints where the image went and the mean number of samples over the pixels that scatter.
@@ -74,7 +143,9 @@ def command(technique, framing, size, out, parameters, head, unit, up, supersamp
     if contrast:
         _writable(contrast, (".png",))
         if not chosen.measures_contrast:
-            raise InputError(f"{technique} measures no contrast; expected golubev_plus with --contrast")
+            raise InputError(
+                f"{technique} measures no contrast; expected golubev_plus with --contrast"
+            )
     loaded = load_head(head, unit, seed, up)
     for note in loaded.notes:
         click.echo(note, err=True)
@@ -84,7 +155,16 @@ def command(technique, framing, size, out, parameters, head, unit, up, supersamp
     if samples:
         np.save(samples, result.samples)
     if contrast:
-        Image.fromarray(np.rint(np.clip(result.contrast, 0, 1) * 255).astype(np.uint8)).save(contrast)
+        Image.fromarray(np.rint(np.clip(result.contrast, 0, 1) * 255).astype(np.uint8)).save(
+            contrast
+        )
     skin = result.samples[result.samples > 0]
-    mean = f"{skin.mean():.2f} samples a pixel over {skin.size} scattering pixels" if skin.size else "no scattering pixel is seen"
-    click.echo(f"{out}: {technique}, {framing}, {size[0]}x{size[1]}; {mean} at {supersample}x{supersample} supersampling")
+    mean = (
+        f"{skin.mean():.2f} samples a pixel over {skin.size} scattering pixels"
+        if skin.size
+        else "no scattering pixel is seen"
+    )
+    click.echo(
+        f"{out}: {technique}, {framing}, {size[0]}x{size[1]}; {mean} at "
+        f"{supersample}x{supersample} supersampling"
+    )

@@ -7,19 +7,50 @@ import click
 
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 for every network of this machine.")
-@click.option("--port", default=8000, show_default=True, type=click.IntRange(0, 65535), help="Port to listen on; 0 takes a free one.")
-@click.option("--database", metavar="URL", help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.")
-@click.option("--reset-password", is_flag=True, help="Set a new dashboard password, show it once, and end every login.")
 @click.option(
-    "--trusted-proxy", metavar="ADDRESS",
-    help="Address of a reverse proxy that ends https; its X-Forwarded-Proto, -Host and -For are believed.",
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="Address to listen on; 0.0.0.0 for every network of this machine.",
 )
-def command(directory: Path, host: str, port: int, database: str | None, reset_password: bool, trusted_proxy: str | None) -> None:
-    """Serve the questionnaire and the dashboard of the study in DIR (a folder with a manifest.json).
+@click.option(
+    "--port",
+    default=8000,
+    show_default=True,
+    type=click.IntRange(0, 65535),
+    help="Port to listen on; 0 takes a free one.",
+)
+@click.option(
+    "--database",
+    metavar="URL",
+    help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.",
+)
+@click.option(
+    "--reset-password",
+    is_flag=True,
+    help="Set a new dashboard password, show it once, and end every login.",
+)
+@click.option(
+    "--trusted-proxy",
+    metavar="ADDRESS",
+    help=(
+        "Address of a reverse proxy that ends https; its X-Forwarded-Proto, -Host and -For "
+        "are believed."
+    ),
+)
+def command(
+    directory: Path,
+    host: str,
+    port: int,
+    database: str | None,
+    reset_password: bool,
+    trusted_proxy: str | None,
+) -> None:
+    """Serve the questionnaire and the dashboard of the study in DIR (a folder with a
+    manifest.json).
 
-    The dashboard's password is made at the first start and shown once. Simulated participants of the same
-    study, if there are any, are under /simulated/.
+    The dashboard's password is made at the first start and shown once. Simulated participants of
+    the same study, if there are any, are under /simulated/.
     """
     from werkzeug.middleware.dispatcher import DispatcherMiddleware
 
@@ -35,11 +66,20 @@ def command(directory: Path, host: str, port: int, database: str | None, reset_p
         application = DispatcherMiddleware(app, {"/simulated": twin})
     proxy = {}
     if trusted_proxy:
-        proxy = {"trusted_proxy": trusted_proxy, "trusted_proxy_headers": {"x-forwarded-for", "x-forwarded-proto", "x-forwarded-host"}}
+        proxy = {
+            "trusted_proxy": trusted_proxy,
+            "trusted_proxy_headers": {"x-forwarded-for", "x-forwarded-proto", "x-forwarded-host"},
+        }
     server = bind(application, host, port, **proxy)
-    shown = password.reset(answers) if reset_password or answers.record().password_hash is None else None
+    shown = (
+        password.reset(answers)
+        if reset_password or answers.record().password_hash is None
+        else None
+    )
     if simulated:
-        twin.config["PASSWORD_HASH"] = answers.record().password_hash  # one password opens both dashboards
+        twin.config["PASSWORD_HASH"] = (
+            answers.record().password_hash
+        )  # one password opens both dashboards
 
     address = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{port_of(server)}"
     click.echo(f"questionnaire  {address}/")

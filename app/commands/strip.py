@@ -7,9 +7,27 @@ import click
 
 @click.command("strip")
 @click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--framing", "-f", default="close-up", show_default=True, help="The framing to compare, by its name in the study.")
-@click.option("--crop", "crops", multiple=True, metavar="WxH+X+Y", help="The part to show, pixel for pixel; repeat for more rows. All of it if not given.")
-@click.option("--out", "-o", required=True, type=click.Path(dir_okay=False, path_type=Path), help="The PNG file to write.")
+@click.option(
+    "--framing",
+    "-f",
+    default="close-up",
+    show_default=True,
+    help="The framing to compare, by its name in the study.",
+)
+@click.option(
+    "--crop",
+    "crops",
+    multiple=True,
+    metavar="WxH+X+Y",
+    help="The part to show, pixel for pixel; repeat for more rows. All of it if not given.",
+)
+@click.option(
+    "--out",
+    "-o",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The PNG file to write.",
+)
 def command(folder: Path, framing: str, crops: tuple[str, ...], out: Path) -> None:
     """Put every condition of the study in FOLDER side by side."""
     from stimuli.errors import InputError

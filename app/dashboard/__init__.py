@@ -1,4 +1,6 @@
-"""What the experimenter sees, behind a password: progress, live results, balance of sides, downloads."""
+"""What the experimenter sees, behind a password: progress, live results, balance of sides,
+downloads.
+"""
 
 from app.dashboard.views import blueprint
 

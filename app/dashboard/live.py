@@ -13,7 +13,8 @@ from app import export
 from app.models import Participant, Response, Trial, now
 from app.study import Study
 
-#: Without an answer for this long, an unfinished participant counts as dropped out (and may still come back).
+#: Without an answer for this long, an unfinished participant counts as dropped out (and may still
+#: come back).
 IDLE = timedelta(minutes=30)
 
 
@@ -41,10 +42,14 @@ def participants(db: Session) -> list[dict[str, Any]]:
     """Each participant, latest first: how far, in which state, the median time of an answer."""
     times: dict[int, list[int]] = {}
     last: dict[int, datetime] = {}
-    for participant, rt_ms, at in db.execute(select(Response.participant_id, Response.rt_ms, Response.answered_at)):
+    for participant, rt_ms, at in db.execute(
+        select(Response.participant_id, Response.rt_ms, Response.answered_at)
+    ):
         times.setdefault(participant, []).append(rt_ms)
         last[participant] = max(at, last.get(participant, at))
-    asked = dict(db.execute(select(Trial.participant_id, func.count()).group_by(Trial.participant_id)).all())
+    asked = dict(
+        db.execute(select(Trial.participant_id, func.count()).group_by(Trial.participant_id)).all()
+    )
     result = []
     for person in db.scalars(select(Participant).order_by(Participant.id.desc())):
         answered = times.get(person.id, [])
@@ -69,7 +74,9 @@ def participants(db: Session) -> list[dict[str, Any]]:
 
 
 def framings(db: Session, study: Study, *, simulated: bool) -> list[dict[str, Any]]:
-    """For each framing: points and AHP priority of each technique, consistency, and what is still missing."""
+    """For each framing: points and AHP priority of each technique, consistency, and what is still
+    missing.
+    """
     records = list(export.records(db, study, simulated=simulated))
     if not records:
         return []
@@ -78,7 +85,9 @@ def framings(db: Session, study: Study, *, simulated: bool) -> list[dict[str, An
     from analysis.responses import responses_from_records
 
     responses = responses_from_records(records, read_manifest(study.directory))
-    points = {(row.framing, row.technique): row.score for row in tallies.scores(responses).itertuples()}
+    points = {
+        (row.framing, row.technique): row.score for row in tallies.scores(responses).itertuples()
+    }
     totals = tallies.totals(responses).set_index("framing")
     result = []
     for framing, comparison in ahp.comparisons(responses).items():
@@ -109,25 +118,37 @@ def framings(db: Session, study: Study, *, simulated: bool) -> list[dict[str, An
 
 
 def about_other_images(db: Session, study: Study) -> int:
-    """How many answers are about images that the study no longer has (it was built again in between)."""
+    """How many answers are about images that the study no longer has (it was built again in
+    between).
+    """
     images = (Response.image_left_sha256, Response.image_right_sha256)
     pairs = db.execute(export.counted(*images, func.count()).group_by(*images))
-    return sum(count for left, right, count in pairs if not {left, right} <= study.images_by_sha256.keys())
+    return sum(
+        count for left, right, count in pairs if not {left, right} <= study.images_by_sha256.keys()
+    )
 
 
 def sides(db: Session, study: Study) -> dict[str, Any]:
-    """Whether it was really randomised: how often each technique stood on each side, and which side was preferred."""
+    """Whether it was really randomised: how often each technique stood on each side, and which side
+    was preferred.
+    """
     shown = {name: {"left": 0, "right": 0} for name in study.techniques}
     for side, column in (("left", Trial.left), ("right", Trial.right)):
         for name, count in db.execute(export.counted(column, func.count()).group_by(column)):
             shown[name][side] = count
     sign = case((Response.answer < 0, "left"), (Response.answer > 0, "right"), else_="neither")
     preferred = dict(db.execute(export.counted(sign, func.count()).group_by(sign)).all())
-    given = dict(db.execute(export.counted(Response.answer, func.count()).group_by(Response.answer)).all())
+    given = dict(
+        db.execute(export.counted(Response.answer, func.count()).group_by(Response.answer)).all()
+    )
     return {
         "shown": [
-            {"label": condition.label, "name": condition.name, **shown[condition.name]} for condition in study.asked.techniques
+            {"label": condition.label, "name": condition.name, **shown[condition.name]}
+            for condition in study.asked.techniques
         ],
         "preferred": {side: preferred.get(side, 0) for side in ("left", "neither", "right")},
-        "given": [{"label": level.label, "count": given.get(level.value, 0)} for level in study.asked.scale],
+        "given": [
+            {"label": level.label, "count": given.get(level.value, 0)}
+            for level in study.asked.scale
+        ],
     }

@@ -1,4 +1,6 @@
-"""The password of the dashboard: generated, shown once, kept only as a hash; and who is logged in."""
+"""The password of the dashboard: generated, shown once, kept only as a hash;
+and who is logged in.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def reset(db: Database) -> str:
     """Set a new random password and return it; it is stored nowhere but as a scrypt hash."""
     password = "-".join("".join(secrets.choice(ALPHABET) for _ in range(4)) for _ in range(4))
     with db.write() as session:
-        session.get_one(StudyRecord, 1).password_hash = generate_password_hash(password, method="scrypt")
+        session.get_one(StudyRecord, 1).password_hash = generate_password_hash(
+            password, method="scrypt"
+        )
     return password
 
 
@@ -44,7 +48,10 @@ def logged_in() -> bool:
     """Whether this browser gave the password that is in force, not too long ago."""
     stored, login = _stored(), session.get("dashboard")
     return bool(
-        stored and login and login["password"] == _fingerprint(stored) and time.time() - login["at"] < LOGIN_LIFETIME_S
+        stored
+        and login
+        and login["password"] == _fingerprint(stored)
+        and time.time() - login["at"] < LOGIN_LIFETIME_S
     )
 
 

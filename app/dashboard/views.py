@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 
-from flask import Blueprint, Response, abort, flash, jsonify, redirect, render_template, request, send_from_directory, url_for
+from flask import (
+    Blueprint,
+    Response,
+    abort,
+    flash,
+    jsonify,
+    redirect,
+    render_template,
+    request,
+    send_from_directory,
+    url_for,
+)
 
 from app import export
 from app.dashboard import live, password
@@ -27,11 +38,18 @@ def _require_login():
 @blueprint.route("/login", methods=["GET", "POST"])
 def login():
     if request.method == "GET":
-        return redirect(url_for(".index"), 303) if password.logged_in() else render_template("dashboard/login.html")
+        return (
+            redirect(url_for(".index"), 303)
+            if password.logged_in()
+            else render_template("dashboard/login.html")
+        )
     if not _logins.allow(request.remote_addr):
         abort(429, "Too many passwords were tried. Wait five minutes and try again.")
     if not password.log_in(request.form.get("password", "")):
-        flash("This is not the password. It was shown when the server first started; `subdermal serve --reset-password` sets a new one.")
+        flash(
+            "This is not the password. It was shown when the server first started; "
+            "`subdermal serve --reset-password` sets a new one."
+        )
         return render_template("dashboard/login.html"), 401
     _logins.forget(request.remote_addr)
     return redirect(url_for(".index"), 303)
@@ -49,7 +67,9 @@ def index():
         "dashboard/index.html",
         images=study().manifest.images,
         framing_labels={framing.name: framing.label for framing in study().asked.framings},
-        technique_labels={condition.name: condition.label for condition in study().asked.techniques},
+        technique_labels={
+            condition.name: condition.label for condition in study().asked.techniques
+        },
         has_report=study().report(simulated()).is_file(),
         **_numbers(),
     )
@@ -90,10 +110,18 @@ def codebook_md():
 @blueprint.get("/report/")
 @blueprint.get("/report/<path:name>")
 def report(name: str = "report.html"):
-    """The report of `subdermal analyse` and what it links to, with a policy of its own: inline styles, no scripts."""
+    """The report of `subdermal analyse` and what it links to, with a policy of its own: inline
+    styles, no scripts.
+    """
     found = study().report(simulated())
     if not found.is_file():
-        abort(404, f"There is no report yet. Download responses.csv, then: subdermal analyse responses.csv --out {found.parent.name}")
+        abort(
+            404,
+            (
+                "There is no report yet. Download responses.csv, then: subdermal analyse "
+                f"responses.csv --out {found.parent.name}"
+            ),
+        )
     response = send_from_directory(found.parent, name)
     response.headers["Content-Security-Policy"] = REPORT_POLICY
     response.headers["Cache-Control"] = "no-store"

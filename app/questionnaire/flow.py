@@ -1,7 +1,8 @@
 """What happens to a participant, without the web: enrol, rate, show, answer, complete, withdraw.
 
-The server owns the position: the current trial is the first one without an answer. Every function takes the
-session of a write transaction (`Database.write`), which is on the disk when its block ends.
+The server owns the position: the current trial is the first one without an answer. Every function
+takes the session of a write transaction (`Database.write`), which is on the disk when its block
+ends.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class Answer:
-    """What the browser sends with an answer; sizes in CSS pixels, None where the browser could not tell."""
+    """What the browser sends with an answer; sizes in CSS pixels, None where the browser could not
+    tell.
+    """
 
     value: int
     rt_ms: int | None
@@ -49,15 +52,17 @@ class Answer:
 def find(session: Session, visit: str | None, *, alone: bool = False) -> Participant | None:
     """The participant of a visit; None before consent.
 
-    alone: wait until no other transaction holds this participant, so that two clicks come one after the other
-    (SQLite has one writer anyway).
+    alone: wait until no other transaction holds this participant, so that two clicks come one after
+    the other (SQLite has one writer anyway).
     """
     query = select(Participant).where(Participant.visit == visit)
     return session.scalar(query.with_for_update() if alone else query) if visit else None
 
 
 def enrol(session: Session, study: Study, visit: str) -> Participant:
-    """The participant of a visit, with the trials assigned; consent given twice is one participant."""
+    """The participant of a visit, with the trials assigned; consent given twice is one
+    participant.
+    """
     if participant := find(session, visit):
         return participant
     participant = Participant(visit=visit)
@@ -77,13 +82,19 @@ def rate(session: Session, participant: Participant, familiarity: int) -> None:
 
 def current(session: Session, participant: Participant) -> Trial | None:
     """The first trial without an answer; None when all are answered."""
-    query = select(Trial).outerjoin(Response).where(Trial.participant_id == participant.id, Response.id.is_(None))
+    query = (
+        select(Trial)
+        .outerjoin(Response)
+        .where(Trial.participant_id == participant.id, Response.id.is_(None))
+    )
     return session.scalar(query.order_by(Trial.order).limit(1))
 
 
 def following(session: Session, trial: Trial) -> Trial | None:
     """The trial after one, whose images are worth fetching beforehand."""
-    return session.scalar(select(Trial).filter_by(participant_id=trial.participant_id, order=trial.order + 1))
+    return session.scalar(
+        select(Trial).filter_by(participant_id=trial.participant_id, order=trial.order + 1)
+    )
 
 
 def count_answers(session: Session, participant: Participant) -> int:
@@ -96,7 +107,9 @@ def show(session: Session, trial: Trial) -> None:
     session.add(Event(participant_id=trial.participant_id, trial_id=trial.id, kind="shown"))
 
 
-def answer(session: Session, study: Study, participant: Participant, trial_id: int, given: Answer) -> Outcome:
+def answer(
+    session: Session, study: Study, participant: Participant, trial_id: int, given: Answer
+) -> Outcome:
     """Append an answer to the current trial; anything else changes nothing."""
     trial = session.get(Trial, trial_id)
     if trial is None or trial.participant_id != participant.id or participant.withdrawn_at:
@@ -104,13 +117,28 @@ def answer(session: Session, study: Study, participant: Participant, trial_id: i
     if trial.response:
         if trial.response.answer == given.value:
             return Outcome.REPEATED
-        _note(session, participant, "refused", trial, f"kept {trial.response.answer}, refused {given.value}")
+        _note(
+            session,
+            participant,
+            "refused",
+            trial,
+            f"kept {trial.response.answer}, refused {given.value}",
+        )
         return Outcome.REFUSED
     shown = session.execute(
-        select(func.min(Event.at), func.count()).where(Event.trial_id == trial.id, Event.kind == "shown")
+        select(func.min(Event.at), func.count()).where(
+            Event.trial_id == trial.id, Event.kind == "shown"
+        )
     ).one()
-    images = (study.image(trial.framing, trial.left).sha256, study.image(trial.framing, trial.right).sha256)
-    if trial is not current(session, participant) or not shown.count or participant.familiarity is None:
+    images = (
+        study.image(trial.framing, trial.left).sha256,
+        study.image(trial.framing, trial.right).sha256,
+    )
+    if (
+        trial is not current(session, participant)
+        or not shown.count
+        or participant.familiarity is None
+    ):
         return Outcome.STALE
     if images != (given.image_left_sha256, given.image_right_sha256):
         return Outcome.STALE
@@ -136,9 +164,11 @@ _RECORDED = tuple(name for name in Answer.__dataclass_fields__ if name not in ("
 
 
 def complete(session: Session, participant: Participant) -> bool:
-    """Give the completion code once as many answers are committed as there are trials; whether it is given.
+    """Give the completion code once as many answers are committed as there are trials; whether it
+    is given.
 
-    Call it in a transaction of its own, after the one of the last answer: what it counts is on the disk.
+    Call it in a transaction of its own, after the one of the last answer: what it counts is on the
+    disk.
     """
     if participant.completion_code:
         return True
@@ -152,7 +182,9 @@ def complete(session: Session, participant: Participant) -> bool:
 
 
 def withdraw(session: Session, participant: Participant) -> None:
-    """Take a participant's answers out of every export, tally and figure; nothing is physically lost."""
+    """Take a participant's answers out of every export, tally and figure; nothing is physically
+    lost.
+    """
     if participant.withdrawn_at is None:
         participant.withdrawn_at = now()
         _note(session, participant, "withdrew")
@@ -161,8 +193,20 @@ def withdraw(session: Session, participant: Participant) -> None:
 def find_by_code(session: Session, code: str) -> Participant | None:
     """The participant who was given a completion code, however it was typed."""
     plain = "".join(code.split()).replace("-", "").upper()
-    return session.scalar(select(Participant).where(Participant.completion_code == plain)) if plain else None
+    return (
+        session.scalar(select(Participant).where(Participant.completion_code == plain))
+        if plain
+        else None
+    )
 
 
-def _note(session: Session, participant: Participant, kind: str, trial: Trial | None = None, detail: str | None = None) -> None:
-    session.add(Event(participant_id=participant.id, trial_id=trial and trial.id, kind=kind, detail=detail))
+def _note(
+    session: Session,
+    participant: Participant,
+    kind: str,
+    trial: Trial | None = None,
+    detail: str | None = None,
+) -> None:
+    session.add(
+        Event(participant_id=participant.id, trial_id=trial and trial.id, kind=kind, detail=detail)
+    )

@@ -1,10 +1,23 @@
-"""The pages of the questionnaire. Each shows what the database says is due, whatever address was asked for."""
+"""The pages of the questionnaire.
+
+Each shows what the database says is due, whatever address was asked for.
+"""
 
 from __future__ import annotations
 
 import secrets
 
-from flask import Blueprint, abort, flash, jsonify, redirect, render_template, request, session, url_for
+from flask import (
+    Blueprint,
+    abort,
+    flash,
+    jsonify,
+    redirect,
+    render_template,
+    request,
+    session,
+    url_for,
+)
 from sqlalchemy.orm import Session
 
 from app.models import Participant, Trial
@@ -41,7 +54,9 @@ def welcome():
 @blueprint.post("/")
 def consent():
     if "visit" not in session:
-        abort(400, "Your browser keeps no cookies. Allow cookies for this site, reload and try again.")
+        abort(
+            400, "Your browser keeps no cookies. Allow cookies for this site, reload and try again."
+        )
     if request.form.get("consent") != "yes":
         flash("Please tick the box if you want to take part.")
         return redirect(url_for(".welcome"), 303)
@@ -119,7 +134,9 @@ def answer():
         if participant is None:
             abort(400, "This browser has not begun the questionnaire.")
         outcome = flow.answer(db, study(), participant, trial, given)
-    with database().write() as db:  # the answer is on the disk: now the committed answers can be counted
+    with (
+        database().write() as db
+    ):  # the answer is on the disk: now the committed answers can be counted
         participant = _participant(db, alone=True)
         flow.complete(db, participant)
         place = _place(db, participant)
@@ -138,10 +155,14 @@ def thanks():
     with database().write() as db:
         participant = _participant(db, alone=True)
         if participant:
-            flow.complete(db, participant)  # where the server stopped between the last answer and the count
+            flow.complete(
+                db, participant
+            )  # where the server stopped between the last answer and the count
         if elsewhere := _elsewhere(db, participant):
             return elsewhere
-        return render_template("questionnaire/thanks.html", participant=participant, **_progress(db, participant))
+        return render_template(
+            "questionnaire/thanks.html", participant=participant, **_progress(db, participant)
+        )
 
 
 @blueprint.get("/withdraw")
@@ -213,11 +234,15 @@ def _number_of_questions() -> int:
 
 def _images(trial: Trial | None):
     """The left and right image of a trial; nothing after the last one."""
-    return [study().image(trial.framing, side) for side in (trial.left, trial.right)] if trial else []
+    return (
+        [study().image(trial.framing, side) for side in (trial.left, trial.right)] if trial else []
+    )
 
 
 def _integer(name: str, low: int, high: int) -> int | None:
-    """A whole number in a field of the form; None where it is absent, not a number or out of range."""
+    """A whole number in a field of the form; None where it is absent, not a number or out of
+    range.
+    """
     try:
         value = int(request.form.get(name, ""))
     except ValueError:

@@ -1,1 +1,3 @@
-"""Simulated participants: who they are (people), how they answer over HTTP (client), where they are let in (views)."""
+"""Simulated participants: who they are (people), how they answer over HTTP (client), where they are
+let in (views).
+"""

@@ -1,4 +1,6 @@
-"""A participant without a body: reads the pages of the questionnaire and sends their forms, as a browser would."""
+"""A participant without a body: reads the pages of the questionnaire and sends their forms, as a
+browser would.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,13 @@ from app.study import Study
 
 TIMEOUT_S = 60
 #: What a browser on a 1920 x 1080 screen would report.
-WINDOW = {"viewport_width": 1920, "viewport_height": 963, "device_pixel_ratio": 1, "shown_width": 955.5, "shown_height": 537.47}
+WINDOW = {
+    "viewport_width": 1920,
+    "viewport_height": 963,
+    "device_pixel_ratio": 1,
+    "shown_width": 955.5,
+    "shown_height": 537.47,
+}
 
 
 @dataclass
@@ -40,7 +48,9 @@ class _Parser(HTMLParser):
             self.forms.append(Form(attributes.get("action") or ""))
         elif tag == "input" and self.forms and attributes.get("name"):
             chosen = attributes.get("type") not in ("radio", "checkbox") or "checked" in attributes
-            self.forms[-1].fields.setdefault(attributes["name"], (attributes.get("value") or "") if chosen else "")
+            self.forms[-1].fields.setdefault(
+                attributes["name"], (attributes.get("value") or "") if chosen else ""
+            )
 
 
 def forms(html: str) -> list[Form]:
@@ -58,29 +68,41 @@ class Visitor:
         self._study, self._crowd, self._seed = study, crowd, seed
 
     def status(self) -> dict[str, Any]:
-        """What the server says of its simulation; refused unless it is one, of this study and seed."""
+        """What the server says of its simulation; refused unless it is one, of this study and
+        seed.
+        """
         address = urljoin(self._base, "simulation/status.json")
         try:
             answer = httpx.get(address, timeout=TIMEOUT_S)
         except (httpx.HTTPError, httpx.InvalidURL) as error:
-            raise InputError(f"--url {self._base}: no answer ({error or type(error).__name__})") from None
+            raise InputError(
+                f"--url {self._base}: no answer ({error or type(error).__name__})"
+            ) from None
         try:
             status = answer.json() if answer.status_code == 200 else {}
         except ValueError:
             status = {}
         if status.get("kind") != "simulated":
-            raise InputError(f"--url {self._base}: expected a simulated study, and real databases take no simulated participants")
+            raise InputError(
+                f"--url {self._base}: expected a simulated study, and real databases take no "
+                "simulated participants"
+            )
         if (status["study"], status["version"]) != (self._study.name, self._study.version):
             raise InputError(
                 f"--url {self._base}: serves {status['study']} version {status['version']}, "
                 f"expected {self._study.name} version {self._study.version}"
             )
         if status["seed"] not in (None, self._seed):
-            raise InputError(f"--seed {self._seed}: these participants were begun with the seed {status['seed']}; go on with it")
+            raise InputError(
+                f"--seed {self._seed}: these participants were begun with the seed "
+                f"{status['seed']}; go on with it"
+            )
         return status
 
     def take_part(self, number: int) -> Iterator[int]:
-        """Answer every question that participant `number` has not answered yet; yields each one's order."""
+        """Answer every question that participant `number` has not answered yet; yields each one's
+        order.
+        """
         with httpx.Client(follow_redirects=True, timeout=TIMEOUT_S) as http:
             page = self._get(http, "simulation/")
             page = self._send(http, page, "seed", number=number, seed=self._seed)
@@ -89,7 +111,9 @@ class Visitor:
             elif not str(page.url).endswith("/thanks"):
                 page = self._get(http, "question")  # half-way: the page that is due
             if form := _find(page, "familiarity"):
-                page = self._send(http, page, "familiarity", familiarity=self._crowd.familiarity(number))
+                page = self._send(
+                    http, page, "familiarity", familiarity=self._crowd.familiarity(number)
+                )
             order = self._answered(number)
             while form := _find(page, "trial"):
                 order += 1
@@ -101,17 +125,27 @@ class Visitor:
                 raise RuntimeError(f"participant {number} got no completion code at {page.url}")
 
     def _answered(self, number: int) -> int:
-        return next((p["answers"] for p in self.status()["participants"] if p["number"] == number), 0)
+        return next(
+            (p["answers"] for p in self.status()["participants"] if p["number"] == number), 0
+        )
 
     def _seen(self, form: Form) -> tuple[str, str, str]:
-        """Framing, left and right technique. The page names neither (people must not know): the hashes tell."""
-        left, right = (self._study.images_by_sha256[form.fields[name]] for name in ("image_left", "image_right"))
+        """Framing, left and right technique.
+
+        The page names neither (people must not know): the hashes tell.
+        """
+        left, right = (
+            self._study.images_by_sha256[form.fields[name]]
+            for name in ("image_left", "image_right")
+        )
         return left.framing, left.technique, right.technique
 
     def _get(self, http: httpx.Client, path: str) -> httpx.Response:
         return _checked(http.get(urljoin(self._base, path)))
 
-    def _send(self, http: httpx.Client, page: httpx.Response, name: str, **filled: Any) -> httpx.Response:
+    def _send(
+        self, http: httpx.Client, page: httpx.Response, name: str, **filled: Any
+    ) -> httpx.Response:
         """Fill in the form that has a field of that name, and send it."""
         form = _find(page, name)
         if form is None:

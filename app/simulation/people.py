@@ -1,11 +1,14 @@
-"""How simulated participants judge: latent worths for each framing, noise, and a reluctance to see a difference.
+"""How simulated participants judge: latent worths for each framing, noise, and a reluctance to see
+a difference.
 
-A participant looks at d = GAIN (worth of right - worth of left) + SIDE_BIAS + noise, noise ~ N(0, NOISE), and answers
-0 where |d| is below `SLIGHT` times the framing's reluctance, +-2 where it is above `CLEAR` times it, else +-1.
+A participant looks at d = GAIN (worth of right - worth of left) + SIDE_BIAS + noise, noise ~ N(0,
+NOISE), and answers 0 where |d| is below `SLIGHT` times the framing's reluctance, +-2 where it is
+above `CLEAR` times it, else +-1.
 
-Worths are the centred natural logarithms of the AHP priorities that the thesis published (study.md): in the thesis's
-design they come out near the published findings: golubev and golubev_plus ahead at close-up, all flatter with distance.
-They say how simulated answers were made, and nothing about people.
+Worths are the centred natural logarithms of the AHP priorities that the thesis published
+(study.md): in the thesis's design they come out near the published findings: golubev and
+golubev_plus ahead at close-up, all flatter with distance. They say how simulated answers were made,
+and nothing about people.
 """
 
 from __future__ import annotations
@@ -17,15 +20,35 @@ from app.study import Study
 
 #: Published priorities (Vuletic, tables 5.2 to 5.4).
 PUBLISHED_PRIORITIES = {
-    "close-up": {"none": 0.0841, "jimenez_separable": 0.1208, "golubev": 0.2766, "golubev_plus": 0.3562, "jimenez_gaussian": 0.1623},
-    "head-shot": {"none": 0.1181, "jimenez_separable": 0.1496, "golubev": 0.2836, "golubev_plus": 0.2836, "jimenez_gaussian": 0.1652},
-    "half-length": {"none": 0.2971, "jimenez_separable": 0.1592, "golubev": 0.1973, "golubev_plus": 0.1680, "jimenez_gaussian": 0.1785},
+    "close-up": {
+        "none": 0.0841,
+        "jimenez_separable": 0.1208,
+        "golubev": 0.2766,
+        "golubev_plus": 0.3562,
+        "jimenez_gaussian": 0.1623,
+    },
+    "head-shot": {
+        "none": 0.1181,
+        "jimenez_separable": 0.1496,
+        "golubev": 0.2836,
+        "golubev_plus": 0.2836,
+        "jimenez_gaussian": 0.1652,
+    },
+    "half-length": {
+        "none": 0.2971,
+        "jimenez_separable": 0.1592,
+        "golubev": 0.1973,
+        "golubev_plus": 0.1680,
+        "jimenez_gaussian": 0.1785,
+    },
 }
 GAIN = 1.2
 NOISE = 0.7
 SIDE_BIAS = 0.0
 SLIGHT, CLEAR = 0.45, 1.35
-RELUCTANCE_STEP = 0.3  # added for each framing after the first: differences are harder to see from farther away
+RELUCTANCE_STEP = (
+    0.3  # added for each framing after the first: differences are harder to see from farther away
+)
 #: Spread of the worths of a technique or framing that the thesis did not have, drawn from the seed.
 UNKNOWN_SPREAD = 0.4
 FAMILIARITY_SHARES = (0.15, 0.25, 0.3, 0.2, 0.1)
@@ -33,18 +56,24 @@ MEDIAN_RT_MS, RT_SPREAD = 6500, 0.5  # log-normal
 
 
 class Crowd:
-    """The simulated participants of a study; what each answers depends on (seed, participant, question) alone."""
+    """The simulated participants of a study; what each answers depends on (seed, participant,
+    question) alone.
+    """
 
     def __init__(self, study: Study, seed: int):
         self._seed = seed
         self._worths = {framing: self._framing_worths(study, framing) for framing in study.framings}
-        self._reluctance = {framing: 1 + RELUCTANCE_STEP * place for place, framing in enumerate(study.framings)}
+        self._reluctance = {
+            framing: 1 + RELUCTANCE_STEP * place for place, framing in enumerate(study.framings)
+        }
 
     def familiarity(self, participant: int) -> int:
         """1 to 5."""
         return self._random(participant, "familiarity").choices(range(1, 6), FAMILIARITY_SHARES)[0]
 
-    def answer(self, participant: int, order: int, framing: str, left: str, right: str) -> tuple[int, int]:
+    def answer(
+        self, participant: int, order: int, framing: str, left: str, right: str
+    ) -> tuple[int, int]:
         """The answer, -2 to 2 (negative: left), and the time it took, ms."""
         random = self._random(participant, order)
         worths, reluctance = self._worths[framing], self._reluctance[framing]
@@ -58,9 +87,13 @@ class Crowd:
         logs = {name: math.log(priority) for name, priority in published.items()}
         centre = sum(logs.values()) / len(logs) if logs else 0.0
         return {
-            name: logs[name] - centre if name in logs else self._random(framing, name).gauss(0, UNKNOWN_SPREAD)
+            name: logs[name] - centre
+            if name in logs
+            else self._random(framing, name).gauss(0, UNKNOWN_SPREAD)
             for name in study.techniques
         }
 
     def _random(self, *key: object) -> Random:
-        return Random("/".join(map(str, (self._seed, *key))))  # a text seeds by its SHA-512: the same everywhere
+        return Random(
+            "/".join(map(str, (self._seed, *key)))
+        )  # a text seeds by its SHA-512: the same everywhere

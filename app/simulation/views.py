@@ -1,4 +1,7 @@
-"""The door for simulated participants. It is built into applications over a simulated database only."""
+"""The door for simulated participants.
+
+It is built into applications over a simulated database only.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,11 @@ def door():
 def status():
     """Which study this is, the seed of its simulation, and how many answers there are."""
     with database().read() as db:
-        answers = dict(db.execute(select(Response.participant_id, func.count()).group_by(Response.participant_id)).all())
+        answers = dict(
+            db.execute(
+                select(Response.participant_id, func.count()).group_by(Response.participant_id)
+            ).all()
+        )
         people = db.scalars(select(Participant).order_by(Participant.id))
         return jsonify(
             kind="simulated",
@@ -31,14 +38,21 @@ def status():
             answers=export.count(db),
             seed=db.get_one(StudyRecord, 1).simulation_seed,
             participants=[
-                {"number": p.id, "answers": answers.get(p.id, 0), "completed": p.completed_at is not None} for p in people
+                {
+                    "number": p.id,
+                    "answers": answers.get(p.id, 0),
+                    "completed": p.completed_at is not None,
+                }
+                for p in people
             ],
         )
 
 
 @blueprint.post("/")
 def let_in():
-    """Take up participant `number` of the simulation with `seed`; all of a database have one seed."""
+    """Take up participant `number` of the simulation with `seed`;
+    all of a database have one seed.
+    """
     number, seed = request.form.get("number", type=int), request.form.get("seed", type=int)
     if number is None or seed is None:
         abort(400, "Expected the whole numbers number and seed.")
@@ -46,7 +60,10 @@ def let_in():
         record = db.get_one(StudyRecord, 1)
         record.simulation_seed = seed if record.simulation_seed is None else record.simulation_seed
         if record.simulation_seed != seed:
-            abort(409, f"This database was simulated with the seed {record.simulation_seed}, not {seed}.")
+            abort(
+                409,
+                f"This database was simulated with the seed {record.simulation_seed}, not {seed}.",
+            )
         newest = db.scalar(select(func.max(Participant.id))) or 0
         if not 1 <= number <= newest + 1:
             abort(409, f"The next new participant is number {newest + 1}, not {number}.")

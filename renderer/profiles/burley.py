@@ -1,7 +1,8 @@
 """Burley's normalised diffusion: R(r) = A s (exp(-s r) + exp(-s r / 3)) / (8 pi r), s = 1 / d.
 
-Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering", Pixar
-technical memo 15-04; inverse CDF in closed form: Golubev 2018, "Sampling Burley's normalized diffusion profiles".
+Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering",
+Pixar technical memo 15-04; inverse CDF in closed form: Golubev 2018, "Sampling Burley's normalized
+diffusion profiles".
 """
 
 from __future__ import annotations
@@ -31,17 +32,22 @@ def cdf(r_mm, d_mm=1.0):
 
 
 def inverse_cdf(u, d_mm=1.0):
-    """r with P(r) = u, u in [0, 1). The thesis's eq. 3.12 prints both exponents as -1/3; one is +1/3."""
+    """r with P(r) = u, u in [0, 1).
+
+    The thesis's eq. 3.12 prints both exponents as -1/3; one is +1/3.
+    """
     u = 1 - np.asarray(u, dtype=float)
     g = 1 + 4 * u * (2 * u + np.sqrt(1 + 4 * u * u))
     return 3 * np.log((1 + g ** (-1 / 3) + g ** (1 / 3)) / (4 * u)) * d_mm
 
 
 def inverse_cdf_halley(u, d_mm=1.0, tolerance: float = 1e-14):
-    """The same r by Halley's iteration (Vuletic eq. 3.11), the way before the closed form was known; raises if it does not converge.
+    """The same r by Halley's iteration (Vuletic eq.
 
-    In y = exp(-x / 3), 1 - P is the polynomial (y^3 + 3 y) / 4: smooth, monotone, with one root in (0, 1]; so the
-    iteration is done there, to a relative `tolerance` in y.
+    3.11), the way before the closed form was known; raises if it does not converge.
+
+    In y = exp(-x / 3), 1 - P is the polynomial (y^3 + 3 y) / 4: smooth, monotone, with one root in
+    (0, 1]; so the iteration is done there, to a relative `tolerance` in y.
     """
     share = 1 - np.asarray(u, dtype=float)
     y = share.copy()
@@ -60,12 +66,16 @@ def from_mean_radius(mean_radius_mm):
 
 
 def transmittance(thickness_mm, d_mm, albedo=1.0):
-    """Light through a slab by Jimenez 2010's argument: int R(sqrt(r^2 + t^2)) 2 pi r dr = A (exp(-st) + 3 exp(-st/3)) / 4."""
+    """Light through a slab by Jimenez 2010's argument: int R(sqrt(r^2 + t^2)) 2 pi r dr = A
+    (exp(-st) + 3 exp(-st/3)) / 4.
+    """
     return albedo * (1 - cdf(thickness_mm, d_mm))
 
 
 def line_kernel(x_mm, d_mm=1.0):
-    """a_p(x) = int R(sqrt(x^2 + y^2)) dy = (s / 4 pi) (K0(s |x|) + K0(s |x| / 3)), 1/mm, logarithmic at 0; A = 1."""
+    """a_p(x) = int R(sqrt(x^2 + y^2)) dy = (s / 4 pi) (K0(s |x|) + K0(s |x| / 3)), 1/mm,
+    logarithmic at 0; A = 1.
+    """
     from scipy.special import k0
 
     x = np.abs(np.asarray(x_mm, dtype=float)) / d_mm
@@ -73,7 +83,9 @@ def line_kernel(x_mm, d_mm=1.0):
 
 
 def line_integral(a_mm, b_mm, d_mm=1.0):
-    """int_a^b of the line kernel, exact: the integral of K0 has a closed form; a <= b, infinite ends allowed."""
+    """int_a^b of the line kernel, exact: the integral of K0 has a closed form; a <= b, infinite
+    ends allowed.
+    """
     from scipy.special import iti0k0
 
     def primitive(x):  # odd; int_0^inf K0 = pi / 2
@@ -106,11 +118,14 @@ PARAMETRISATIONS = {"mfp": s_searchlight_mfp, "dmfp": s_searchlight_dmfp, "diffu
 
 @dataclass(frozen=True)
 class Burley(Profile):
-    """Burley's profile of a medium. parametrisation: "mfp", "dmfp" (both searchlight) or "diffuse" (diffuse transmission, mfp).
+    """Burley's profile of a medium.
 
-    The fits were made for a half-space of isotropic scatterers without a boundary, so the shape is taken from the albedo that the
-    medium would have there (Chandrasekhar, exact), and the height from the albedo behind its real boundary (Saunderson).
-    T(r) = R(sqrt(r^2 + thickness^2)), which is what transmittance by thickness assumes.
+    parametrisation: "mfp", "dmfp" (both searchlight) or "diffuse" (diffuse transmission, mfp).
+
+    The fits were made for a half-space of isotropic scatterers without a boundary, so the shape is
+    taken from the albedo that the medium would have there (Chandrasekhar, exact), and the height
+    from the albedo behind its real boundary (Saunderson). T(r) = R(sqrt(r^2 + thickness^2)), which
+    is what transmittance by thickness assumes.
     """
 
     parametrisation: str = "mfp"
@@ -122,7 +137,10 @@ class Burley(Profile):
     def __post_init__(self):
         super().__post_init__()
         if self.parametrisation not in PARAMETRISATIONS:
-            raise InputError(f"parametrisation is {self.parametrisation!r}; expected one of {', '.join(PARAMETRISATIONS)}")
+            raise InputError(
+                f"parametrisation is {self.parametrisation!r}; expected one of "
+                f"{', '.join(PARAMETRISATIONS)}"
+            )
 
     def distance_mm(self) -> np.ndarray:
         """d = length / s(A), mm: (C,)."""
@@ -130,11 +148,20 @@ class Burley(Profile):
         from renderer.profiles.dipole import grosjean_D
 
         m = self.medium
-        albedo = (chandrasekhar.diffuse_albedo if self.parametrisation == "diffuse" else chandrasekhar.searchlight_albedo)(m.albedo_prime)
+        albedo = (
+            chandrasekhar.diffuse_albedo
+            if self.parametrisation == "diffuse"
+            else chandrasekhar.searchlight_albedo
+        )(m.albedo_prime)
         if self.parametrisation == "dmfp":
             if min(m.sigma_a) == 0:
-                raise InputError("sigma_a is 0: there is no diffuse mean free path; expected the parametrisation mfp or diffuse")
-            length = np.sqrt(grosjean_D(m.sigma_a, m.sigma_s_prime) / np.array(m.sigma_a))  # Vuletic eq. 2.87
+                raise InputError(
+                    "sigma_a is 0: there is no diffuse mean free path; expected the "
+                    "parametrisation mfp or diffuse"
+                )
+            length = np.sqrt(
+                grosjean_D(m.sigma_a, m.sigma_s_prime) / np.array(m.sigma_a)
+            )  # Vuletic eq. 2.87
         else:
             length = m.mfp
         return length / PARAMETRISATIONS[self.parametrisation](albedo)
@@ -143,7 +170,9 @@ class Burley(Profile):
         """A, the reflected share of the flux that has entered: (C,)."""
         from renderer.profiles import chandrasekhar
 
-        return chandrasekhar.surface_albedo(self.medium.albedo_prime, self.medium.eta / self.stack.n_above)
+        return chandrasekhar.surface_albedo(
+            self.medium.albedo_prime, self.medium.eta / self.stack.n_above
+        )
 
     def reflectance(self, r_mm):
         r = radii(r_mm)
@@ -154,7 +183,9 @@ class Burley(Profile):
     def transmittance(self, r_mm):
         if np.isinf(self.thickness_mm):
             return np.zeros((len(radii(r_mm)), self.medium.channels))
-        return reflectance(np.hypot(radii(r_mm), self.thickness_mm), self.distance_mm(), self.albedo())
+        return reflectance(
+            np.hypot(radii(r_mm), self.thickness_mm), self.distance_mm(), self.albedo()
+        )
 
     def totals(self):
         return self.albedo(), transmittance(self.thickness_mm, self.distance_mm(), self.albedo())

@@ -1,8 +1,10 @@
-"""Burley's curve fits judged by a Monte Carlo of their own setting: half-space, no boundary, isotropic scatterers, sigma_t = 1/mm.
+"""Burley's curve fits judged by a Monte Carlo of their own setting: half-space, no boundary,
+isotropic scatterers, sigma_t = 1/mm.
 
-Where photons go does not depend on what the medium absorbs, only their weight alpha^n after n scatterings does. So photons
-are walked once and counted by (n, r); every albedo's profile is a weighted sum of that table. Photons are ended with probability
-1 - ALPHA_END a scattering, which only thins out those whose weight is spent.
+Where photons go does not depend on what the medium absorbs, only their weight alpha^n after n
+scatterings does. So photons are walked once and counted by (n, r); every albedo's profile is a
+weighted sum of that table. Photons are ended with probability 1 - ALPHA_END a scattering, which
+only thins out those whose weight is spent.
 """
 
 from __future__ import annotations
@@ -89,7 +91,9 @@ def _orders() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Table:
-    """Photons by (scatterings, radius): counts (ORDER_ROWS, R_BINS + 1), the first bin holds all below R_MIN too."""
+    """Photons by (scatterings, radius): counts (ORDER_ROWS, R_BINS + 1), the first bin holds all
+    below R_MIN too.
+    """
 
     photons: int
     seed: int
@@ -97,11 +101,17 @@ class Table:
     counts: np.ndarray
 
     def profile(self, alpha: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Bin edges (R_BINS + 1,), share of the light in each bin (R_BINS,) and its standard error."""
+        """Bin edges (R_BINS + 1,), share of the light in each bin (R_BINS,) and its standard
+        error.
+        """
         weight = (alpha / ALPHA_END) ** _orders()
         share, square = weight @ self.counts, weight**2 @ self.counts
         share, square = share[:-1] / self.photons, square[:-1] / self.photons
-        return np.geomspace(R_MIN, R_MAX, R_BINS + 1), share, np.sqrt(np.maximum(square - share**2, 0) / self.photons)
+        return (
+            np.geomspace(R_MIN, R_MAX, R_BINS + 1),
+            share,
+            np.sqrt(np.maximum(square - share**2, 0) / self.photons),
+        )
 
     def total(self, alpha: float) -> tuple[float, float]:
         """Total reflectance and its standard error."""
@@ -135,7 +145,9 @@ def walk(photons: int, seed: int = 0, diffuse: bool = False) -> Table:
 
 @dataclass(frozen=True)
 class Judged:
-    """One parametrisation against Monte Carlo, per albedo of ALBEDOS: best s, its error, the fit's s and its error (mean |relative error|)."""
+    """One parametrisation against Monte Carlo, per albedo of ALBEDOS: best s, its error, the fit's
+    s and its error (mean |relative error|).
+    """
 
     parametrisation: str
     albedo: np.ndarray
@@ -145,37 +157,57 @@ class Judged:
     error_fit: np.ndarray
 
 
-def judge(parametrisation: str, photons: int, seed: int = 0, albedos=ALBEDOS, known: float = 0.05) -> Judged:
+def judge(
+    parametrisation: str, photons: int, seed: int = 0, albedos=ALBEDOS, known: float = 0.05
+) -> Judged:
     """Compare R(r) of each albedo with Monte Carlo over RANGE.
 
-    The error is the mean of |R - R_MC| / R_MC over logarithmic bins whose standard error is below `known`; R is averaged over a bin by its
-    CDF, as photons are. The memo prints neither its radii nor their spacing, and both matter: docs/profiles.md.
+    The error is the mean of |R - R_MC| / R_MC over logarithmic bins whose standard error is below
+    `known`; R is averaged over a bin by its CDF, as photons are. The memo prints neither its radii
+    nor their spacing, and both matter: docs/profiles.md.
     """
     from scipy.optimize import minimize_scalar
 
     if parametrisation not in burley.PARAMETRISATIONS:
-        raise InputError(f"parametrisation is {parametrisation!r}; expected one of {', '.join(burley.PARAMETRISATIONS)}")
+        raise InputError(
+            f"parametrisation is {parametrisation!r}; expected one of "
+            f"{', '.join(burley.PARAMETRISATIONS)}"
+        )
     fit = burley.PARAMETRISATIONS[parametrisation]
     diffuse = parametrisation == "diffuse"
     table = walk(photons, seed, diffuse)
     rows = []
     for A in np.asarray(albedos, dtype=float):
         alpha = chandrasekhar.albedo_of(A, diffuse)
-        length = float(np.sqrt(grosjean_D(1 - alpha, alpha) / (1 - alpha))) if parametrisation == "dmfp" else 1.0
+        length = (
+            float(np.sqrt(grosjean_D(1 - alpha, alpha) / (1 - alpha)))
+            if parametrisation == "dmfp"
+            else 1.0
+        )
         edges, share, error = table.profile(alpha)
         keep = (edges[:-1] >= RANGE[0]) & (edges[1:] <= RANGE[1]) & (error < known * share)
         if not keep.any():
-            raise InputError(f"{photons} photons leave no bin known to {100 * known:g} % at an albedo of {A:g}; expected more")
+            raise InputError(
+                f"{photons} photons leave no bin known to {100 * known:g} % at an albedo of "
+                f"{A:g}; expected more"
+            )
         low, high, share = edges[:-1][keep], edges[1:][keep], share[keep]
 
-        def miss(log_s):
-            got = A * (burley.cdf(high, length / np.exp(log_s)) - burley.cdf(low, length / np.exp(log_s)))
+        def miss(log_s, A=A, low=low, high=high, length=length, share=share):
+            got = A * (
+                burley.cdf(high, length / np.exp(log_s)) - burley.cdf(low, length / np.exp(log_s))
+            )
             return float(np.abs(got / share - 1).mean())
 
         # The error has one valley in s; a grid finds it, a search narrows it.
         grid = np.log(length * np.geomspace(0.4, 10, 80))
         at = int(np.argmin([miss(s) for s in grid]))
-        best = minimize_scalar(miss, bounds=(grid[max(at - 1, 0)], grid[min(at + 1, 79)]), method="bounded", options={"xatol": 1e-5})
+        best = minimize_scalar(
+            miss,
+            bounds=(grid[max(at - 1, 0)], grid[min(at + 1, 79)]),
+            method="bounded",
+            options={"xatol": 1e-5},
+        )
         rows.append((np.exp(best.x), best.fun, fit(A), miss(np.log(fit(A)))))
     columns = np.array(rows).T
     return Judged(parametrisation, np.asarray(albedos, dtype=float), *columns)

@@ -1,7 +1,9 @@
-"""Exact total reflectance of a half-space that scatters isotropically, and what a boundary makes of it.
+"""Exact total reflectance of a half-space that scatters isotropically, and what a boundary makes of
+it.
 
-Chandrasekhar 1950, "Radiative transfer", ch. III and V: without a boundary, light from direction mu returns
-1 - H(mu) sqrt(1 - alpha), with 1 / H(mu) = sqrt(1 - alpha) + (alpha / 2) int_0^1 mu' H(mu') / (mu + mu') dmu'.
+Chandrasekhar 1950, "Radiative transfer", ch. III and V: without a boundary, light from direction mu
+returns 1 - H(mu) sqrt(1 - alpha), with 1 / H(mu) = sqrt(1 - alpha) + (alpha / 2) int_0^1 mu' H(mu')
+/ (mu + mu') dmu'.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ def _h(albedo: float) -> tuple[float, float]:
         if done:
             break
     else:
-        raise ArithmeticError(f"Chandrasekhar's H function did not converge for an albedo of {albedo}")
+        raise ArithmeticError(
+            f"Chandrasekhar's H function did not converge for an albedo of {albedo}"
+        )
     return 1 / (root + float((albedo / 2 * w * mu / (1 + mu)) @ H)), float((w * mu * H).sum())
 
 
@@ -49,10 +53,11 @@ def diffuse_albedo(albedo) -> np.ndarray:
 
 
 def surface_albedo(albedo, eta: float) -> np.ndarray:
-    """Reflected share of light that has entered straight down through a face of relative index eta, without the mirror reflection.
+    """Reflected share of light that has entered straight down through a face of relative index eta,
+    without the mirror reflection.
 
-    Saunderson 1942: (1 - F_dr) A / (1 - F_dr A_d), which takes light at the face to be diffuse. Against Monte Carlo: 1 to 2 % for
-    alpha' of 0.9 and more, 10 % at 0.5.
+    Saunderson 1942: (1 - F_dr) A / (1 - F_dr A_d), which takes light at the face to be diffuse.
+    Against Monte Carlo: 1 to 2 % for alpha' of 0.9 and more, 10 % at 0.5.
     """
     f = fresnel.diffuse_reflectance(eta)
     return (1 - f) * searchlight_albedo(albedo) / (1 - f * diffuse_albedo(albedo))

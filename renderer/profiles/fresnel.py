@@ -1,7 +1,8 @@
 """Fresnel reflection of a smooth or rough dielectric and its averages over directions.
 
-eta is the index on the side that light comes from over the index on the other: eta > 1 seen from inside a denser medium
-(with total internal reflection), eta < 1 seen from outside. mu is the cosine of the angle of incidence, 0 to 1.
+eta is the index on the side that light comes from over the index on the other: eta > 1 seen from
+inside a denser medium (with total internal reflection), eta < 1 seen from outside. mu is the cosine
+of the angle of incidence, 0 to 1.
 """
 
 from __future__ import annotations
@@ -13,7 +14,10 @@ import numpy as np
 from renderer.errors import InputError
 
 NODES = 200
-FIT_RANGE = (0.5, 2.2)  # relative indices within which each polynomial is right to 0.007; outside they run away
+FIT_RANGE = (
+    0.5,
+    2.2,
+)  # relative indices within which each polynomial is right to 0.007; outside they run away
 
 
 def _check(eta: float) -> float:
@@ -23,7 +27,9 @@ def _check(eta: float) -> float:
 
 
 def reflectance(mu, eta: float) -> np.ndarray:
-    """Exact unpolarised reflectance F(mu) of a dielectric, 1 beyond the critical angle; shape of mu."""
+    """Exact unpolarised reflectance F(mu) of a dielectric, 1 beyond the critical angle; shape of
+    mu.
+    """
     mu = np.clip(np.asarray(mu, dtype=float), 0, 1)
     sin2_t = _check(eta) ** 2 * (1 - mu**2)
     mu_t = np.sqrt(np.maximum(1 - sin2_t, 0))
@@ -47,7 +53,10 @@ def moment(i: int, eta: float) -> float:
     t, w = np.polynomial.legendre.leggauss(NODES)
     t, w = 0.5 * (t + 1), 0.5 * w
     mu = critical + (1 - critical) * t**2  # F has a square root at the critical angle
-    return float(critical ** (i + 1) / (i + 1) + (w * reflectance(mu, eta) * mu**i * 2 * t * (1 - critical)).sum())
+    return float(
+        critical ** (i + 1) / (i + 1)
+        + (w * reflectance(mu, eta) * mu**i * 2 * t * (1 - critical)).sum()
+    )
 
 
 def diffuse_reflectance(eta: float) -> float:
@@ -79,12 +88,25 @@ def three_c2_fit(eta: float) -> float:
         return 0.0
     if eta < 1:
         return float(np.polyval([0.145787, 0.236494, -1.95284, 3.36231, -2.62051, 0.828421], eta))
-    return float(np.polyval([1.91826, -27.0181, 164.798, -568.556, 1213.67, -1641.1, 1376.53, -656.175, 135.926], eta) / eta**3)
+    return float(
+        np.polyval(
+            [1.91826, -27.0181, 164.798, -568.556, 1213.67, -1641.1, 1376.53, -656.175, 135.926],
+            eta,
+        )
+        / eta**3
+    )
 
 
 def extrapolation(eta: float, fit: bool = True) -> float:
-    """A = (1 + F_dr) / (1 - F_dr) of the classic boundary, by the polynomial where it holds. Rohat sec. 4.2.2 prints its reciprocal."""
-    f = diffuse_reflectance_fit(eta) if fit and FIT_RANGE[0] <= eta <= FIT_RANGE[1] else diffuse_reflectance(eta)
+    """A = (1 + F_dr) / (1 - F_dr) of the classic boundary, by the polynomial where it holds.
+
+    Rohat sec. 4.2.2 prints its reciprocal.
+    """
+    f = (
+        diffuse_reflectance_fit(eta)
+        if fit and FIT_RANGE[0] <= eta <= FIT_RANGE[1]
+        else diffuse_reflectance(eta)
+    )
     return (1 + f) / (1 - f)
 
 
@@ -96,21 +118,29 @@ def better_extrapolation(eta: float, fit: bool = True) -> float:
 
 def exit_moments(eta: float, fit: bool = True) -> tuple[float, float]:
     """(2 C_1, 3 C_2) by the polynomials where they hold, or exactly."""
-    return (two_c1_fit(eta), three_c2_fit(eta)) if fit and FIT_RANGE[0] <= eta <= FIT_RANGE[1] else (2 * moment(1, eta), 3 * moment(2, eta))
+    return (
+        (two_c1_fit(eta), three_c2_fit(eta))
+        if fit and FIT_RANGE[0] <= eta <= FIT_RANGE[1]
+        else (2 * moment(1, eta), 3 * moment(2, eta))
+    )
 
 
 def exit_weights(eta: float, fit: bool = True) -> tuple[float, float]:
-    """(C_phi, C_E) = ((1 - 2 C_1) / 4, (1 - 3 C_2) / 2); BSSRDF notes prints them without the 1/4 and 1/2."""
+    """(C_phi, C_E) = ((1 - 2 C_1) / 4, (1 - 3 C_2) / 2); BSSRDF notes prints them without the 1/4
+    and 1/2.
+    """
     c1, c2 = exit_moments(eta, fit)
     return (1 - c1) / 4, (1 - c2) / 2
 
 
 @lru_cache(maxsize=64)
 def rough_directional_reflectance(mu_o: float, eta: float, roughness: float) -> float:
-    """rho(mu_o) = int f_r (n . w_i) dw_i of Cook and Torrance's BRDF with Beckmann slopes, on the side eta says.
+    """rho(mu_o) = int f_r (n .
 
-    f_r = D F G / (4 (n.i)(n.o)), V-cavity G; the integral is over half vectors, drawn in strata of the Beckmann density
-    D (n.h), so that D and 1/(4 (o.h)) cancel.
+    w_i) dw_i of Cook and Torrance's BRDF with Beckmann slopes, on the side eta says.
+
+    f_r = D F G / (4 (n.i)(n.o)), V-cavity G; the integral is over half vectors, drawn in strata of
+    the Beckmann density D (n.h), so that D and 1/(4 (o.h)) cancel.
     """
     if not 0 < roughness <= 1:
         raise InputError(f"roughness is {roughness}; expected a Beckmann slope in (0, 1]")
@@ -131,7 +161,9 @@ def rough_directional_reflectance(mu_o: float, eta: float, roughness: float) -> 
 
 @lru_cache(maxsize=64)
 def rough_diffuse_reflectance(eta: float, roughness: float) -> float:
-    """rho_d = 2 int rho(mu) mu dmu, which takes the place of F_dr at a rough face (Donner and Jensen 2005, sec. 5)."""
+    """rho_d = 2 int rho(mu) mu dmu, which takes the place of F_dr at a rough face (Donner and
+    Jensen 2005, sec. 5).
+    """
     if roughness == 0:
         return diffuse_reflectance(eta)
     t, w = np.polynomial.legendre.leggauss(24)
@@ -139,5 +171,7 @@ def rough_diffuse_reflectance(eta: float, roughness: float) -> float:
     total = 0.0
     for low, high in ((0.0, critical), (critical, 1.0)):
         for mu, weight in zip(low + (high - low) * 0.5 * (t + 1), w * (high - low), strict=True):
-            total += weight * mu * rough_directional_reflectance(float(mu), float(eta), float(roughness))
+            total += (
+                weight * mu * rough_directional_reflectance(float(mu), float(eta), float(roughness))
+            )
     return float(total)

@@ -14,7 +14,12 @@ from renderer.profiles import models, single
 from renderer.profiles.photons import MonteCarlo
 from renderer.profiles.table import CHANNELS
 
-MATERIALS = ("wholemilk", "marble", "skin1", "ketchup")  # from almost no absorption to almost nothing else
+MATERIALS = (
+    "wholemilk",
+    "marble",
+    "skin1",
+    "ketchup",
+)  # from almost no absorption to almost nothing else
 RANGE_MFP = (0.1, 10.0)  # radii that are judged, in mean free paths
 KNOWN = 0.05  # relative standard error of a ring that is judged
 # Models that leave out light which scatters once are judged with it, too.
@@ -23,8 +28,12 @@ WITHOUT_SINGLE = ("better_dipole", "quantized_diffusion")
 
 @dataclass(frozen=True)
 class Verdict:
-    """One model, one material, one face ("R" or, of a slab, "T") and one channel. Light that passes a slab unscattered is not judged. Errors are relative; `total_error` and `curve_error` in per cent, the latter the mean of
-    |R - R_MC| / R_MC over logarithmic rings, `radial_error` is E of eq. 3.1 over them."""
+    """One model, one material, one face ("R" or, of a slab, "T") and one channel.
+
+    Light that passes a slab unscattered is not judged. Errors are relative; `total_error` and
+    `curve_error` in per cent, the latter the mean of |R - R_MC| / R_MC over logarithmic rings,
+    `radial_error` is E of eq. 3.1 over them.
+    """
 
     material: str
     model: str
@@ -43,7 +52,9 @@ class Verdict:
     def words(self) -> str:
         """What to think of it, by the worse of the total's and the curve's error."""
         worst = max(abs(self.total_error), self.curve_error)
-        return "good" if worst <= 10 else "fair" if worst <= 25 else "poor" if worst <= 60 else "bad"
+        return (
+            "good" if worst <= 10 else "fair" if worst <= 25 else "poor" if worst <= 60 else "bad"
+        )
 
 
 def _ring_means(reflectance, edges: np.ndarray) -> np.ndarray:
@@ -71,7 +82,7 @@ def _candidates(stack: Stack) -> list[tuple]:
         if slab and T is not None:
             out.append((name, "T", model.transmittance, T))
         if name in WITHOUT_SINGLE and not slab:
-            once = lambda r, model=model: model.reflectance(r) + single.reflectance(stack, r)  # noqa: E731
+            once = lambda r, model=model: model.reflectance(r) + single.reflectance(stack, r)
             out.append((f"{name} + single", "R", once, R + single.total(stack)))
     return out
 
@@ -80,25 +91,55 @@ def judge(stack: Stack, photons: int, seed: int) -> list[Verdict]:
     """Every model of one material that can take it, face by face and channel by channel."""
     truth = MonteCarlo(stack, photons, seed)
     results, edges, entered = truth.results(), truth.edges_mm(), truth.entered()
-    where = f"{stack.name} {stack.thickness_mm:g} mm" if len(stack.layers) == 1 and np.isfinite(stack.thickness_mm) else stack.name
+    where = (
+        f"{stack.name} {stack.thickness_mm:g} mm"
+        if len(stack.layers) == 1 and np.isfinite(stack.thickness_mm)
+        else stack.name
+    )
     out = []
     for name, face, curve, total in _candidates(stack):
         means = _ring_means(curve, edges[1:])
         for c, result in enumerate(results):
             mfp = min(layer.medium.mfp[c] for layer in stack.layers)
             R, error = (getattr(result, key)[1:] / entered for key in (face, f"{face}_error"))
-            seen = (edges[1:-1] >= RANGE_MFP[0] * mfp) & (edges[2:] <= RANGE_MFP[1] * mfp) & (R > 0) & (error < KNOWN * R)
+            seen = (
+                (edges[1:-1] >= RANGE_MFP[0] * mfp)
+                & (edges[2:] <= RANGE_MFP[1] * mfp)
+                & (R > 0)
+                & (error < KNOWN * R)
+            )
             if not seen.any():
-                raise InputError(f"{photons} photons leave no ring of {where} known to {100 * KNOWN:g} %; expected more photons")
+                raise InputError(
+                    f"{photons} photons leave no ring of {where} known to {100 * KNOWN:g} %; "
+                    "expected more photons"
+                )
             area, miss = np.diff(edges[1:] ** 2)[seen], means[seen, c] - R[seen]
             if face == "R":
-                known, deviation = result.diffuse_reflectance / entered, result.diffuse_reflectance_error / entered
+                known, deviation = (
+                    result.diffuse_reflectance / entered,
+                    result.diffuse_reflectance_error / entered,
+                )
             else:
-                known, deviation = (result.transmittance - result.ballistic) / entered, result.transmittance_error / entered
-            out.append(Verdict(
-                where, name, face, CHANNELS[c], float(stack.layers[0].medium.albedo_prime[c]), known, deviation, float(total[c]),
-                100 * (float(total[c]) / known - 1), 100 * float(np.abs(miss / R[seen]).mean()),
-                100 * float(np.sqrt((area * miss**2).sum() / (area * R[seen] ** 2).sum())), int(seen.sum())))
+                known, deviation = (
+                    (result.transmittance - result.ballistic) / entered,
+                    result.transmittance_error / entered,
+                )
+            out.append(
+                Verdict(
+                    where,
+                    name,
+                    face,
+                    CHANNELS[c],
+                    float(stack.layers[0].medium.albedo_prime[c]),
+                    known,
+                    deviation,
+                    float(total[c]),
+                    100 * (float(total[c]) / known - 1),
+                    100 * float(np.abs(miss / R[seen]).mean()),
+                    100 * float(np.sqrt((area * miss**2).sum() / (area * R[seen] ** 2).sum())),
+                    int(seen.sum()),
+                )
+            )
     return out
 
 
@@ -108,23 +149,39 @@ def to_csv(verdicts: list[Verdict]) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*(f.name for f in fields(Verdict)), "verdict"])
     for verdict in verdicts:
-        writer.writerow([*(f"{v:.6g}" if isinstance(v, float) else v for v in astuple(verdict)), verdict.words])
+        writer.writerow(
+            [*(f"{v:.6g}" if isinstance(v, float) else v for v in astuple(verdict)), verdict.words]
+        )
     return out.getvalue()
 
 
 def to_markdown(verdicts: list[Verdict]) -> str:
-    """One row a material, model and face: errors of the total and of the curve, R / G / B, and the verdicts."""
+    """One row a material, model and face: errors of the total and of the curve, R / G / B, and the
+    verdicts.
+    """
     order = ("good", "fair", "poor", "bad")
-    lines = ["| material | model | total, error in % (R / G / B) | curve, mean error in % (R / G / B) | verdict |", "|---|---|---|---|---|"]
+    lines = [
+        (
+            "| material | model | total, error in % (R / G / B) | curve, mean error in % (R / G "
+            "/ B) | verdict |"
+        ),
+        "|---|---|---|---|---|",
+    ]
     for material, model, face in dict.fromkeys((v.material, v.model, v.face) for v in verdicts):
         rows = [v for v in verdicts if (v.material, v.model, v.face) == (material, model, face)]
         words = sorted({v.words for v in rows}, key=order.index)
-        lines.append(f"| {material} | {model}{', T' if face == 'T' else ''} | {' / '.join(f'{v.total_error:+.1f}' for v in rows)} | "
-                     f"{' / '.join(f'{v.curve_error:.1f}' for v in rows)} | {words[0] if len(words) == 1 else f'{words[0]} to {words[-1]}'} |")
+        lines.append(
+            f"| {material} | {model}{', T' if face == 'T' else ''} | "
+            f"{' / '.join(f'{v.total_error:+.1f}' for v in rows)} | "
+            f"{' / '.join(f'{v.curve_error:.1f}' for v in rows)} | "
+            f"{words[0] if len(words) == 1 else f'{words[0]} to {words[-1]}'} |"
+        )
     return "\n".join(lines) + "\n"
 
 
-def judge_presets(names=MATERIALS, thickness_mm: float | None = None, photons: int = 1_000_000, seed: int = 0) -> list[Verdict]:
+def judge_presets(
+    names=MATERIALS, thickness_mm: float | None = None, photons: int = 1_000_000, seed: int = 0
+) -> list[Verdict]:
     """The table for several presets, half-spaces or slabs of one thickness."""
     out = []
     for name in names:

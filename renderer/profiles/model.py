@@ -15,7 +15,9 @@ def radii(r_mm) -> np.ndarray:
     """r_mm as (N, 1), checked: finite, > 0."""
     r = np.atleast_1d(np.asarray(r_mm, dtype=float))
     if r.ndim != 1 or not np.isfinite(r).all() or (r < 0).any():
-        raise InputError("a radius is negative, infinite or not a number; expected millimetres of 0 or more")
+        raise InputError(
+            "a radius is negative, infinite or not a number; expected millimetres of 0 or more"
+        )
     return r[:, None]
 
 
@@ -23,8 +25,8 @@ def radii(r_mm) -> np.ndarray:
 class Profile:
     """Base of all profiles. R and T are per unit of flux that has entered the medium, in 1/mm^2.
 
-    layers: how many the model can take (0: any number); knows_thickness: whether a finite slab differs from a half-space;
-    knows_roughness: whether it can take a rough face.
+    layers: how many the model can take (0: any number); knows_thickness: whether a finite slab
+    differs from a half-space; knows_roughness: whether it can take a rough face.
     """
 
     stack: Stack
@@ -37,9 +39,15 @@ class Profile:
 
     def __post_init__(self):
         if self.layers and len(self.stack.layers) != self.layers:
-            raise InputError(f"{self.name} is for one layer, got {len(self.stack.layers)}; expected layered or montecarlo for more")
+            raise InputError(
+                f"{self.name} is for one layer, got {len(self.stack.layers)}; expected "
+                "layered or montecarlo for more"
+            )
         if self.stack.roughness and not self.knows_roughness:
-            raise InputError(f"{self.name} knows smooth faces only, got a roughness of {self.stack.roughness:g}; expected 0, or dipole, multipole or layered")
+            raise InputError(
+                f"{self.name} knows smooth faces only, got a roughness of "
+                f"{self.stack.roughness:g}; expected 0, or dipole, multipole or layered"
+            )
 
     @property
     def medium(self) -> Medium:

@@ -15,8 +15,19 @@ from renderer.profiles.multipole import Multipole
 from renderer.profiles.photons import MonteCarlo
 from renderer.profiles.quantized_diffusion import QuantizedDiffusion
 
-MODELS: dict[str, type[Profile]] = {model.name: model for model in (
-    Dipole, BetterDipole, Multipole, Layered, QuantizedDiffusion, Burley, GaussianSum, MonteCarlo)}
+MODELS: dict[str, type[Profile]] = {
+    model.name: model
+    for model in (
+        Dipole,
+        BetterDipole,
+        Multipole,
+        Layered,
+        QuantizedDiffusion,
+        Burley,
+        GaussianSum,
+        MonteCarlo,
+    )
+}
 
 
 def make(name: str, stack: Stack, **parameters) -> Profile:
@@ -27,8 +38,9 @@ def make(name: str, stack: Stack, **parameters) -> Profile:
 
 
 def reach_mm(stack: Stack, channel: int | None = None) -> float:
-    """A radius that holds all but a thousandth of what a medium reflects: 12 diffuse mean free paths of its most far-reaching layer and
-    channel, and between 30 and 300 mean free paths."""
+    """A radius that holds all but a thousandth of what a medium reflects: 12 diffuse mean free
+    paths of its most far-reaching layer and channel, and between 30 and 300 mean free paths.
+    """
     pick = slice(None) if channel is None else slice(channel, channel + 1)
     reach = 0.0
     for layer in stack.layers:

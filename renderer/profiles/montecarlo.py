@@ -1,8 +1,9 @@
 """Monte Carlo in layered media: the judge of every diffusion profile here.
 
-Photons as in MCML (see walk.py) in plane layers with refractive faces. Photons are walked in BATCHES independent batches, each
-with a random stream of its own that follows from the seed alone; standard errors come from the spread between batches. So
-the numbers depend on photons and seed, and not on how many threads there were or how often the run was interrupted.
+Photons as in MCML (see walk.py) in plane layers with refractive faces. Photons are walked in
+BATCHES independent batches, each with a random stream of its own that follows from the seed alone;
+standard errors come from the spread between batches. So the numbers depend on photons and seed, and
+not on how many threads there were or how often the run was interrupted.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ import numpy as np
 from renderer.errors import InputError
 
 BATCHES = 64
-CHUNK, CHUNK_S = 256, 0.02  # photons between two looks at the stop sign: this many at first, then as many as take that long
+CHUNK, CHUNK_S = (
+    256,
+    0.02,
+)  # photons between two looks at the stop sign: this many at first, then as many as take that long
 SAVE_EVERY_S = 30.0
 BINS, MOST_BINS, ANGLES = 120, 10_000, 90
 ILLUMINATIONS = ("searchlight", "diffuse")
@@ -40,8 +44,9 @@ def _number(name: str, value, low: float, expected: str, finite: bool = True) ->
 
 @dataclass(frozen=True)
 class Layer:
-    """A homogeneous layer: index n >= 1; mu_a and mu_s, absorption and scattering in 1/mm, >= 0; mean cosine -1 < g < 1;
-    thickness d in mm, > 0, infinite for a half-space."""
+    """A homogeneous layer: index n >= 1; mu_a and mu_s, absorption and scattering in 1/mm, >= 0;
+    mean cosine -1 < g < 1; thickness d in mm, > 0, infinite for a half-space.
+    """
 
     n: float = 1.0
     mu_a: float = 0.0
@@ -54,7 +59,9 @@ class Layer:
         _number("mu_a", self.mu_a, 0, "absorption in 1/mm, 0 or more")
         _number("mu_s", self.mu_s, 0, "scattering in 1/mm, 0 or more")
         if abs(_number("g", self.g, -1, "a mean cosine between -1 and 1, both excluded")) >= 1:
-            raise InputError(f"g is {self.g!r}; expected a mean cosine between -1 and 1, both excluded")
+            raise InputError(
+                f"g is {self.g!r}; expected a mean cosine between -1 and 1, both excluded"
+            )
         if _number("d", self.d, 0, "a thickness in mm, more than 0", finite=False) == 0:
             raise InputError("d is 0; expected a thickness in mm, more than 0")
         for name in self.__dataclass_fields__:  # so that 1 and 1.0 have one name in the cache
@@ -67,16 +74,23 @@ class Layer:
 
     @classmethod
     def parse(cls, text: str) -> Layer:
-        """A layer from "n=1.4 mu_a=1 mu_s=10 g=0.9 d=1"; n is 1, g is 0 and d infinite where they are left out."""
+        """A layer from "n=1.4 mu_a=1 mu_s=10 g=0.9 d=1"; n is 1, g is 0 and d infinite where they
+        are left out.
+        """
         found = {}
         for word in text.replace(",", " ").split():
             name, _, value = word.partition("=")
             if name not in cls.__dataclass_fields__ or name in found:
-                raise InputError(f"layer {text!r}: {word!r}; expected each of n, mu_a, mu_s, g and d at most once, as in mu_a=0.1")
+                raise InputError(
+                    f"layer {text!r}: {word!r}; expected each of n, mu_a, mu_s, g and d at "
+                    "most once, as in mu_a=0.1"
+                )
             try:
                 found[name] = float(value)
             except ValueError:
-                raise InputError(f"layer {text!r}: {name} is {value!r}; expected a number") from None
+                raise InputError(
+                    f"layer {text!r}: {name} is {value!r}; expected a number"
+                ) from None
         if not {"mu_a", "mu_s"} <= set(found):
             raise InputError(f"layer {text!r} lacks mu_a or mu_s; expected both, in 1/mm")
         return cls(**found)
@@ -98,19 +112,38 @@ class Setting:
         if not self.layers or not all(isinstance(layer, Layer) for layer in self.layers):
             raise InputError("layers is empty or holds something else; expected at least one Layer")
         if any(math.isinf(layer.d) for layer in self.layers[:-1]):
-            raise InputError("a layer with another below it is infinite; expected a thickness d in mm")
+            raise InputError(
+                "a layer with another below it is infinite; expected a thickness d in mm"
+            )
         if math.isinf(self.layers[-1].d) and self.layers[-1].mu_a == 0:
-            raise InputError("the last layer is infinite and absorbs nothing, so photons would never end; expected mu_a > 0 or a thickness d")
+            raise InputError(
+                "the last layer is infinite and absorbs nothing, so photons would never end; "
+                "expected mu_a > 0 or a thickness d"
+            )
         for name in ("n_above", "n_below"):
-            object.__setattr__(self, name, _number(name, getattr(self, name), 1, "an index of refraction, 1 or more"))
+            object.__setattr__(
+                self,
+                name,
+                _number(name, getattr(self, name), 1, "an index of refraction, 1 or more"),
+            )
         if self.illumination not in ILLUMINATIONS:
-            raise InputError(f"illumination is {self.illumination!r}; expected {' or '.join(ILLUMINATIONS)}")
+            raise InputError(
+                f"illumination is {self.illumination!r}; expected {' or '.join(ILLUMINATIONS)}"
+            )
         object.__setattr__(self, "seed", _whole("seed", self.seed, 0))
         edges = np.array(self.edges_mm)
         if len(edges) - 1 > MOST_BINS:
             raise InputError(f"there are {len(edges) - 1} bins; expected {MOST_BINS} at most")
-        if len(edges) < 2 or not np.isfinite(edges).all() or edges[0] != 0 or (np.diff(edges) <= 0).any():
-            raise InputError("the edges of the bins are not rising numbers; expected 0 < r1 < r2 < ..., in mm, 0 first")
+        if (
+            len(edges) < 2
+            or not np.isfinite(edges).all()
+            or edges[0] != 0
+            or (np.diff(edges) <= 0).any()
+        ):
+            raise InputError(
+                "the edges of the bins are not rising numbers; expected 0 < r1 < r2 < ..., "
+                "in mm, 0 first"
+            )
 
     def key(self) -> str:
         """Name of this setting's results: a hash of all parameters and of the code that walks."""
@@ -135,17 +168,28 @@ class Setting:
 
 
 def _whole(name: str, value, low: int) -> int:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < low:
+    if (
+        isinstance(value, (bool, np.bool_))
+        or not isinstance(value, (int, np.integer))
+        or value < low
+    ):
         raise InputError(f"{name} is {value!r}; expected a whole number of {low} or more")
     return int(value)
 
 
 class Tally:
-    """Sums of weights of every batch: one (BATCHES, K) array and its named views, (BATCHES, ...) each."""
+    """Sums of weights of every batch: one (BATCHES, K) array and its named views, (BATCHES, ...)
+    each.
+    """
 
     def __init__(self, setting: Setting):
         bins = len(setting.edges_mm)
-        shapes = {"unscattered": (2,), "absorbed": (len(setting.layers),), "radial": (4, bins), "angular": (2, setting.angles)}
+        shapes = {
+            "unscattered": (2,),
+            "absorbed": (len(setting.layers),),
+            "radial": (4, bins),
+            "angular": (2, setting.angles),
+        }
         self.sums = np.zeros((BATCHES, sum(math.prod(shape) for shape in shapes.values())))
         at = 0
         for name, shape in shapes.items():
@@ -156,7 +200,10 @@ class Tally:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What became of one unit of light. All shares are of the incident light; each NAME has a NAME_error, one standard error."""
+    """What became of one unit of light.
+
+    All shares are of the incident light; each NAME has a NAME_error, one standard error.
+    """
 
     setting: Setting
     photons: int
@@ -234,10 +281,18 @@ class Result:
 
     def as_dict(self) -> dict:
         """Everything, ready for JSON."""
-        plain = lambda value: value.tolist() if isinstance(value, np.ndarray) else value  # noqa: E731
+        plain = lambda value: value.tolist() if isinstance(value, np.ndarray) else value
         setting = asdict(self.setting)
-        setting["layers"] = [{name: value for name, value in layer.items() if value != math.inf} for layer in setting["layers"]]
-        found = {"photons": self.photons, **setting, "r_mm": plain(self.r_mm), "angle_edges": plain(self.angle_edges)}
+        setting["layers"] = [
+            {name: value for name, value in layer.items() if value != math.inf}
+            for layer in setting["layers"]
+        ]
+        found = {
+            "photons": self.photons,
+            **setting,
+            "r_mm": plain(self.r_mm),
+            "angle_edges": plain(self.angle_edges),
+        }
         del found["angles"]
         for name in Result._MEANS:
             found[name], found[f"{name}_error"] = map(plain, self._estimate(name))
@@ -250,20 +305,29 @@ def batch_sizes(photons: int) -> np.ndarray:
 
 
 def default_reach_mm(layers: Sequence[Layer]) -> float:
-    """A radius that holds nearly all of what comes back: 12 diffusion lengths, and 10 to 300 reduced mean free paths."""
+    """A radius that holds nearly all of what comes back: 12 diffusion lengths, and 10 to 300
+    reduced mean free paths.
+    """
     reach = []
     for layer in layers:
         if mu_t := layer.mu_a + layer.mu_s * (1 - layer.g):
-            diffuse = min(1 / math.sqrt(3 * layer.mu_a * mu_t) if layer.mu_a else math.inf, sum(each.d for each in layers))
+            diffuse = min(
+                1 / math.sqrt(3 * layer.mu_a * mu_t) if layer.mu_a else math.inf,
+                sum(each.d for each in layers),
+            )
             reach.append(min(max(12 * diffuse, 10 / mu_t), 300 / mu_t))
     return max(reach, default=1.0)
 
 
 def cache_folder() -> Path:
-    """Where results are kept: montecarlo in $SUBDERMAL_CACHE, else in $XDG_CACHE_HOME/subdermal, else in ~/.cache/subdermal."""
+    """Where results are kept: montecarlo in $SUBDERMAL_CACHE, else in $XDG_CACHE_HOME/subdermal,
+    else in ~/.cache/subdermal.
+    """
     if chosen := os.environ.get("SUBDERMAL_CACHE"):
         return Path(chosen).expanduser().absolute() / "montecarlo"
-    base = Path(os.environ.get("XDG_CACHE_HOME", ""))  # the XDG specification has relative paths ignored
+    base = Path(
+        os.environ.get("XDG_CACHE_HOME", "")
+    )  # the XDG specification has relative paths ignored
     return (base if base.is_absolute() else Path.home() / ".cache") / "subdermal" / "montecarlo"
 
 
@@ -282,45 +346,73 @@ def simulate(
 ) -> Result:
     """Send light on a stack of layers, first one on top, and count where it leaves.
 
-    illumination: "searchlight", straight down at the origin, or "diffuse", cosine-distributed from above at the origin.
-    bins: that many rings out to r_max_mm, r_max (i / bins)^2 wide apart, so that they are finest near the origin; or the
-    edges of the rings themselves, 0 first, mm. r_max_mm defaults to a radius that holds nearly all of the light.
+    illumination: "searchlight", straight down at the origin, or "diffuse", cosine-distributed from
+    above at the origin. bins: that many rings out to r_max_mm, r_max (i / bins)^2 wide apart, so
+    that they are finest near the origin; or the edges of the rings themselves, 0 first, mm.
+    r_max_mm defaults to a radius that holds nearly all of the light.
 
     The result has, each with its standard error in NAME_error and as a share of the incident light:
       specular: mirrored at the first face, or come back from further down without being scattered
-      diffuse_reflectance = single_reflectance + multiple_reflectance: left above, scattered once, or more than once
-      transmittance = ballistic + single_transmittance + multiple_transmittance: left below; ballistic unscattered
-      absorbed, absorbed_by_layer (L,); specular + diffuse_reflectance + transmittance + absorbed = 1 to rounding
-    and curves of scattered light: R, R_single, R_multiple, T, ... in 1/mm^2 on rings r_mm, edges_mm (what left beyond the
-    last ring is R_beyond, T_beyond: the curve times area_mm2 and this sum to the total), and R_angular, T_angular in 1/sr,
-    radiance times cosine as in MCML, on bins of exit angles angle_edges: times solid_angle they sum to the scattered total.
+      diffuse_reflectance = single_reflectance + multiple_reflectance: left above, scattered once,
+      or more than once transmittance = ballistic + single_transmittance + multiple_transmittance:
+      left below; ballistic unscattered absorbed, absorbed_by_layer (L,); specular +
+      diffuse_reflectance + transmittance + absorbed = 1 to rounding
+    and curves of scattered light: R, R_single, R_multiple, T, ... in 1/mm^2 on rings r_mm, edges_mm
+    (what left beyond the last ring is R_beyond, T_beyond: the curve times area_mm2 and this sum to
+    the total), and R_angular, T_angular in 1/sr, radiance times cosine as in MCML, on bins of exit
+    angles angle_edges: times solid_angle they sum to the scattered total.
 
-    cache: keep the result in the user's cache, where an interrupted run goes on and one with more photons starts from the
-    largest with fewer. progress: a bar on stderr. threads: one a core if None; the numbers do not depend on it.
+    cache: keep the result in the user's cache, where an interrupted run goes on and one with more
+    photons starts from the largest with fewer. progress: a bar on stderr. threads: one a core if
+    None; the numbers do not depend on it.
     """
     layers = tuple(layers)
-    photons, threads = _whole("photons", photons, BATCHES), _cores() if threads is None else _whole("threads", threads, 1)
+    photons, threads = (
+        _whole("photons", photons, BATCHES),
+        _cores() if threads is None else _whole("threads", threads, 1),
+    )
     if np.ndim(bins) == 0:
         count = min(_whole("bins", bins, 1), MOST_BINS + 1)  # more than enough to be refused
-        reach = default_reach_mm([layer for layer in layers if isinstance(layer, Layer)]) if r_max_mm is None else r_max_mm
+        reach = (
+            default_reach_mm([layer for layer in layers if isinstance(layer, Layer)])
+            if r_max_mm is None
+            else r_max_mm
+        )
         if _number("r_max_mm", reach, 0, "a radius in mm, more than 0") == 0:
             raise InputError("r_max_mm is 0; expected a radius in mm, more than 0")
         bins = reach * (np.arange(count + 1) / count) ** 2
     elif r_max_mm is not None:
         raise InputError("r_max_mm and the edges of the bins are both given; expected one of them")
-    setting = Setting(layers, seed, n_above, n_below, illumination, tuple(float(edge) for edge in bins))
+    setting = Setting(
+        layers, seed, n_above, n_below, illumination, tuple(float(edge) for edge in bins)
+    )
     run = Run(setting, photons, cache_folder() if cache else None)
     if (run.done < run.sizes).any():
         run.go(progress, threads)
     return Result(setting, photons, run.tally)
 
 
-def half_space(alpha: float, photons: int, seed: int = 0, illumination: str = "searchlight", bins: int | Sequence[float] = BINS, **rest) -> Result:
-    """Burley's setting: isotropic scatterers of single-scattering albedo alpha, no boundary, sigma_t = 1/mm, so that mm are mean free paths.
+def half_space(
+    alpha: float,
+    photons: int,
+    seed: int = 0,
+    illumination: str = "searchlight",
+    bins: int | Sequence[float] = BINS,
+    **rest,
+) -> Result:
+    """Burley's setting: isotropic scatterers of single-scattering albedo alpha, no boundary,
+    sigma_t = 1/mm, so that mm are mean free paths.
 
     illumination "diffuse" is his diffuse transmission: light that enters cosine-distributed.
     """
-    return simulate([Layer(mu_a=1 - alpha, mu_s=alpha)], photons, seed, illumination=illumination, bins=bins, **rest)
+    return simulate(
+        [Layer(mu_a=1 - alpha, mu_s=alpha)],
+        photons,
+        seed,
+        illumination=illumination,
+        bins=bins,
+        **rest,
+    )
 
 
 def _cores() -> int:
@@ -328,7 +420,9 @@ def _cores() -> int:
 
 
 class Run:
-    """The batches of one simulation: how far each is, its random state and its sums; can be left and taken up at any chunk."""
+    """The batches of one simulation: how far each is, its random state and its sums; can be left
+    and taken up at any chunk.
+    """
 
     def __init__(self, setting: Setting, photons: int, folder: Path | None):
         self.setting, self.sizes = setting, batch_sizes(photons)
@@ -342,7 +436,9 @@ class Run:
             self._take_up(folder)
 
     def _take_up(self, folder: Path) -> None:
-        """Start from the stored run of this setting that is furthest and not too far; what cannot be read does not count."""
+        """Start from the stored run of this setting that is furthest and not too far; what cannot
+        be read does not count.
+        """
         for file in folder.glob(f"{self.setting.key()}-*.npz"):
             try:
                 with np.load(file, allow_pickle=False) as stored:
@@ -371,8 +467,14 @@ class Run:
         from renderer.profiles.walk import walk
 
         arrays, lock, stop = self.setting.arrays(), threading.Lock(), threading.Event()
-        bar = tqdm(total=int(self.sizes.sum()), initial=int(self.done.sum()), desc="photons", unit="", unit_scale=True,
-                   disable=None if progress else True)
+        bar = tqdm(
+            total=int(self.sizes.sum()),
+            initial=int(self.done.sum()),
+            desc="photons",
+            unit="",
+            unit_scale=True,
+            disable=None if progress else True,
+        )
 
         def batch(b: int) -> None:
             mine = Tally(self.setting)
@@ -391,10 +493,14 @@ class Run:
                     count *= 2
 
         with bar, ThreadPoolExecutor(threads) as pool:
-            waiting = {pool.submit(batch, b) for b in range(BATCHES) if self.done[b] < self.sizes[b]}
+            waiting = {
+                pool.submit(batch, b) for b in range(BATCHES) if self.done[b] < self.sizes[b]
+            }
             try:
                 while waiting:
-                    finished, waiting = wait(waiting, timeout=SAVE_EVERY_S, return_when=FIRST_COMPLETED)
+                    finished, waiting = wait(
+                        waiting, timeout=SAVE_EVERY_S, return_when=FIRST_COMPLETED
+                    )
                     for future in finished:
                         future.result()
                     if not finished:

@@ -15,8 +15,9 @@ from renderer.profiles.model import Profile, radii
 class MonteCarlo(Profile):
     """Light straight down on a stack, photon by photon.
 
-    Per unit of flux that has entered, like every other profile here: the simulation's curves are divided by 1 - F of the lit face.
-    Between bin centres log R is interpolated; outside of them, and where no photon came, R is unknown (nan).
+    Per unit of flux that has entered, like every other profile here: the simulation's curves are
+    divided by 1 - F of the lit face. Between bin centres log R is interpolated; outside of them,
+    and where no photon came, R is unknown (nan).
     """
 
     photons: int = 1_000_000
@@ -31,10 +32,17 @@ class MonteCarlo(Profile):
         return 1 - fresnel.normal_reflectance(self.stack.layers[0].medium.eta / self.stack.n_above)
 
     def edges_mm(self) -> np.ndarray:
-        """Rings in which photons are counted, from a fiftieth of a mean free path to the medium's reach: (121,)."""
+        """Rings in which photons are counted, from a fiftieth of a mean free path to the medium's
+        reach: (121,).
+        """
         from renderer.profiles import models
 
-        return np.concatenate([[0.0], np.geomspace(models.finest_mm(self.stack) / 50, models.reach_mm(self.stack), 120)])
+        return np.concatenate(
+            [
+                [0.0],
+                np.geomspace(models.finest_mm(self.stack) / 50, models.reach_mm(self.stack), 120),
+            ]
+        )
 
     def results(self, progress: bool = True) -> list:
         """One simulation a channel (montecarlo.Result), cached by its parameters."""
@@ -43,9 +51,27 @@ class MonteCarlo(Profile):
         stack, edges = self.stack, self.edges_mm()
         out = []
         for c in range(stack.channels):
-            layers = [montecarlo.Layer(n=layer.medium.eta, mu_a=layer.medium.sigma_a[c], mu_s=float(layer.medium.sigma_s[c]),
-                                       g=float(layer.medium.g), d=float(layer.thickness_mm)) for layer in stack.layers]
-            out.append(montecarlo.simulate(layers, self.photons, self.seed, stack.n_above, stack.n_below, bins=edges, progress=progress))
+            layers = [
+                montecarlo.Layer(
+                    n=layer.medium.eta,
+                    mu_a=layer.medium.sigma_a[c],
+                    mu_s=float(layer.medium.sigma_s[c]),
+                    g=float(layer.medium.g),
+                    d=float(layer.thickness_mm),
+                )
+                for layer in stack.layers
+            ]
+            out.append(
+                montecarlo.simulate(
+                    layers,
+                    self.photons,
+                    self.seed,
+                    stack.n_above,
+                    stack.n_below,
+                    bins=edges,
+                    progress=progress,
+                )
+            )
         return out
 
     def _curve(self, r_mm, which: str) -> np.ndarray:
@@ -57,7 +83,13 @@ class MonteCarlo(Profile):
                 out.append(np.full(len(r), np.nan))
                 continue
             with np.errstate(divide="ignore"):
-                log = np.interp(np.log(r), np.log(result.r_mm[known]), np.log(value[known]), left=np.nan, right=np.nan)
+                log = np.interp(
+                    np.log(r),
+                    np.log(result.r_mm[known]),
+                    np.log(value[known]),
+                    left=np.nan,
+                    right=np.nan,
+                )
             out.append(np.exp(log) / self.entered())
         return np.stack(out, axis=-1)
 
@@ -70,6 +102,11 @@ class MonteCarlo(Profile):
         return self._curve(r_mm, "T")
 
     def totals(self):
-        """Diffuse reflectance and transmittance, with the light that passes unscattered: (C,) each."""
+        """Diffuse reflectance and transmittance, with the light that passes unscattered: (C,)
+        each.
+        """
         results = self.results()
-        return tuple(np.array([getattr(r, name) for r in results]) / self.entered() for name in ("diffuse_reflectance", "transmittance"))
+        return tuple(
+            np.array([getattr(r, name) for r in results]) / self.entered()
+            for name in ("diffuse_reflectance", "transmittance")
+        )

@@ -1,7 +1,9 @@
-"""Quantized diffusion: d'Eon and Irving 2011, "A quantized-diffusion model for rendering translucent materials", doi:10.1145/1964921.1964951.
+"""Quantized diffusion: d'Eon and Irving 2011, "A quantized-diffusion model for rendering
+translucent materials", doi:10.1145/1964921.1964951.
 
-Diffusion from an extended source, sliced in time: each slice is a Gaussian of variance v_i. BSSRDF notes garbles the weights; the
-forms below use erfcx, which neither overflows nor loses digits at any variance. Single scattering is not part of it (single.py).
+Diffusion from an extended source, sliced in time: each slice is a Gaussian of variance v_i. BSSRDF
+notes garbles the weights; the forms below use erfcx, which neither overflows nor loses digits at
+any variance. Single scattering is not part of it (single.py).
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ IMAGES = 12
 
 
 def _g(z, m, v, sigma_t):
-    """exp(m sigma_t + sigma_t^2 v / 2) erfc((m + sigma_t v + z) / sqrt(2 v)), stable; 0 at z = inf."""
+    """exp(m sigma_t + sigma_t^2 v / 2) erfc((m + sigma_t v + z) / sqrt(2 v)), stable; 0 at z =
+    inf.
+    """
     if np.isinf(z):
         return np.zeros(np.broadcast_shapes(np.shape(m), np.shape(v)))
     a = (m + sigma_t * v + z) / np.sqrt(2 * v)
@@ -31,19 +35,32 @@ def _g(z, m, v, sigma_t):
 
 
 def w_phi(v, z1, z2, m, albedo, sigma_t):
-    """int_z1^z2 of the source Q(z) = alpha' sigma_t' exp(-sigma_t' z) times the 1-D Gaussian of variance v at z + m."""
+    """int_z1^z2 of the source Q(z) = alpha' sigma_t' exp(-sigma_t' z) times the 1-D Gaussian of
+    variance v at z + m.
+    """
     return albedo * sigma_t / 2 * (_g(z1, m, v, sigma_t) - _g(z2, m, v, sigma_t))
 
 
 def w_E(v, z1, z2, m, albedo, sigma_t, D):
-    """-D d/dm of w_phi: D sigma_t [-w_phi + alpha' (e^E(z1) - e^E(z2)) / sqrt(2 pi v)], E(z) = -(m + z)^2 / 2v - sigma_t z."""
-    edge = lambda z: 0.0 if np.isinf(z) else np.exp(-((m + z) ** 2) / (2 * v) - sigma_t * z)  # noqa: E731
-    return D * sigma_t * (-w_phi(v, z1, z2, m, albedo, sigma_t) + albedo * (edge(z1) - edge(z2)) / np.sqrt(2 * np.pi * v))
+    """-D d/dm of w_phi: D sigma_t [-w_phi + alpha' (e^E(z1) - e^E(z2)) / sqrt(2 pi v)], E(z) = -(m
+    + z)^2 / 2v - sigma_t z.
+    """
+    edge = lambda z: 0.0 if np.isinf(z) else np.exp(-((m + z) ** 2) / (2 * v) - sigma_t * z)
+    return (
+        D
+        * sigma_t
+        * (
+            -w_phi(v, z1, z2, m, albedo, sigma_t)
+            + albedo * (edge(z1) - edge(z2)) / np.sqrt(2 * np.pi * v)
+        )
+    )
 
 
 @dataclass(frozen=True)
 class QuantizedDiffusion(Profile):
-    """ratio: of one slice's end to the one before, (1, 2]; the paper takes 1.5 to 2, 1.1 has an error of a quarter of a per cent."""
+    """ratio: of one slice's end to the one before, (1, 2]; the paper takes 1.5 to 2, 1.1 has an
+    error of a quarter of a per cent.
+    """
 
     ratio: float = 1.1
 
@@ -56,23 +73,37 @@ class QuantizedDiffusion(Profile):
             raise InputError(f"ratio is {self.ratio}; expected more than 1 and at most 2")
 
     def gaussians(self, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Variances v_i in mm^2 and the weights of R and of T, so that R(r) = sum_i w_i G_2D(v_i, r): (K,) each."""
+        """Variances v_i in mm^2 and the weights of R and of T, so that R(r) = sum_i w_i G_2D(v_i,
+        r): (K,) each.
+        """
         m, stack = self.medium, self.stack
-        mu_a, sigma_t, albedo = m.sigma_a[channel], m.sigma_t_prime[channel], m.albedo_prime[channel]
+        mu_a, sigma_t, albedo = (
+            m.sigma_a[channel],
+            m.sigma_t_prime[channel],
+            m.albedo_prime[channel],
+        )
         D = float(grosjean_D(mu_a, m.sigma_s_prime[channel]))
         eta_above, eta_below = m.eta / stack.n_above, m.eta / stack.n_below
-        z_above, z_below = 2 * D * fresnel.better_extrapolation(eta_above), 2 * D * fresnel.better_extrapolation(eta_below)
+        z_above, z_below = (
+            2 * D * fresnel.better_extrapolation(eta_above),
+            2 * D * fresnel.better_extrapolation(eta_below),
+        )
         d = self.thickness_mm
         P = d + z_above + z_below
-        # Slices from a hundredth of a mean free path to where absorption or the faces leave nothing; tau_0 = 0.
+        # Slices from a hundredth of a mean free path to where absorption or the faces leave
+        # nothing; tau_0 = 0.
         first = 1e-4 / (D * sigma_t**2)
         ends = [28 / mu_a if mu_a else np.inf, 28 / D * (P / np.pi) ** 2, 1e10 / (D * sigma_t**2)]
         count = int(np.ceil(np.log(min(ends) / first) / np.log(self.ratio))) + 1
         tau = np.concatenate([[0.0], first * self.ratio ** np.arange(count)])
         v = D * (tau[1:] + tau[:-1])
-        w = np.exp(-tau[:-1] * mu_a) * -np.expm1(-np.diff(tau) * mu_a) / mu_a if mu_a else np.diff(tau)
-        phi = lambda offset: w_phi(v, 0.0, d, offset, albedo, sigma_t)  # noqa: E731
-        flux = lambda offset: w_E(v, 0.0, d, offset, albedo, sigma_t, D)  # noqa: E731
+        w = (
+            np.exp(-tau[:-1] * mu_a) * -np.expm1(-np.diff(tau) * mu_a) / mu_a
+            if mu_a
+            else np.diff(tau)
+        )
+        phi = lambda offset: w_phi(v, 0.0, d, offset, albedo, sigma_t)
+        flux = lambda offset: w_E(v, 0.0, d, offset, albedo, sigma_t, D)
         c_phi, c_e = fresnel.exit_weights(eta_above)
         R, T = np.zeros(len(v)), np.zeros(len(v))
         for j in range(-IMAGES, IMAGES + 1) if np.isfinite(d) else (0,):
@@ -81,7 +112,9 @@ class QuantizedDiffusion(Profile):
             R += c_phi * (phi(m_r) - phi(-m_v)) + c_e * (flux(m_r) + flux(-m_v))
             if np.isfinite(d):
                 c_phi_d, c_e_d = fresnel.exit_weights(eta_below)
-                T += c_phi_d * (phi(m_r - d) - phi(d - m_v)) - c_e_d * (flux(m_r - d) + flux(d - m_v))
+                T += c_phi_d * (phi(m_r - d) - phi(d - m_v)) - c_e_d * (
+                    flux(m_r - d) + flux(d - m_v)
+                )
         return v, albedo * w * R, albedo * w * T
 
     def _at(self, r_mm, which: int) -> np.ndarray:

@@ -1,4 +1,6 @@
-"""Profiles side by side as rows of a table; an empty field is a value that the model does not have."""
+"""Profiles side by side as rows of a table; an empty field is a value that the model does not
+have.
+"""
 
 from __future__ import annotations
 
@@ -37,5 +39,7 @@ def totals_csv(profiles: list[Profile]) -> str:
     for profile in profiles:
         R, T = profile.totals()
         for c, channel in enumerate(CHANNELS):
-            writer.writerow([profile.name, channel, f"{R[c]:.6f}", "" if T is None else f"{T[c]:.6f}"])
+            writer.writerow(
+                [profile.name, channel, f"{R[c]:.6f}", "" if T is None else f"{T[c]:.6f}"]
+            )
     return out.getvalue()

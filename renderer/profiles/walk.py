@@ -1,9 +1,11 @@
-"""The compiled photon walk behind montecarlo.py: one function, plain arrays in, weights added to plain arrays.
+"""The compiled photon walk behind montecarlo.py: one function, plain arrays in, weights added to
+plain arrays.
 
-Wang, Jacques and Zheng 1995, "MCML: Monte Carlo modeling of light transport in multi-layered tissues",
-doi:10.1016/0169-2607(95)01640-F; scattering by Henyey and Greenstein 1941. What costs time there is done otherwise here,
-without loss: path lengths by a ziggurat instead of a logarithm, azimuths by a table and a short series (error below 1e-14)
-instead of sine and cosine, and turning a direction needs one division and one square root.
+Wang, Jacques and Zheng 1995, "MCML: Monte Carlo modeling of light transport in multi-layered
+tissues", doi:10.1016/0169-2607(95)01640-F; scattering by Henyey and Greenstein 1941. What costs
+time there is done otherwise here, without loss: path lengths by a ziggurat instead of a logarithm,
+azimuths by a table and a short series (error below 1e-14) instead of sine and cosine, and turning a
+direction needs one division and one square root.
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ AZIMUTH_STEP = 2 * math.pi / AZIMUTHS * 2.0**-45
 
 
 def _ziggurat(strips: int = 256, tail: float = 7.69711747013104972):
-    """Edges x and heights exp(-x) of strips of one area under exp(-x); Marsaglia and Tsang 2000, doi:10.18637/jss.v005.i08."""
+    """Edges x and heights exp(-x) of strips of one area under exp(-x); Marsaglia and Tsang 2000,
+    doi:10.18637/jss.v005.i08.
+    """
     area = (tail + 1) * math.exp(-tail)
     x = [area / math.exp(-tail), tail]
     while len(x) < strips:
@@ -37,7 +41,9 @@ _INLINE = {"inline": "always", "error_model": "numpy"}
 
 @numba.njit(**_INLINE)
 def _bits(state):
-    """splitmix64: Steele, Lea and Flood 2014, doi:10.1145/2660193.2660195. (next state, 64 random bits)."""
+    """splitmix64: Steele, Lea and Flood 2014, doi:10.1145/2660193.2660195. (next state, 64 random
+    bits).
+    """
     state = state + np.uint64(0x9E3779B97F4A7C15)
     z = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -72,7 +78,10 @@ def _exponential(state):
 def _azimuth(bits):
     """Cosine and sine of a uniform angle: the table's nearest angle, turned by at most pi / 256."""
     at = np.int64(bits >> np.uint64(56))
-    d = np.float64(np.int64((bits >> np.uint64(11)) & np.uint64(0x1FFFFFFFFFFF)) - 0x100000000000) * AZIMUTH_STEP
+    d = (
+        np.float64(np.int64((bits >> np.uint64(11)) & np.uint64(0x1FFFFFFFFFFF)) - 0x100000000000)
+        * AZIMUTH_STEP
+    )
     dd = d * d
     s = d * (1 - dd * (1 / 6) * (1 - dd * (1 / 20)))
     c = 1 - dd * 0.5 * (1 - dd * (1 / 12))
@@ -81,7 +90,9 @@ def _azimuth(bits):
 
 @numba.njit(**_INLINE)
 def fresnel(n1, n2, cos1):
-    """(reflectance of unpolarised light, cosine beyond the face); exact; 1 and 0 in total reflection."""
+    """(reflectance of unpolarised light, cosine beyond the face); exact; 1 and 0 in total
+    reflection.
+    """
     ratio = n1 / n2
     sine2 = ratio * ratio * (1 - cos1 * cos1)
     if sine2 >= 1:
@@ -104,17 +115,34 @@ def _bin(edges, value):
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-def walk(photons, state, diffuse, n, z, mu_t, albedo, g, r2_edges, sin2_edges, unscattered, absorbed, radial, angular):
+def walk(
+    photons,
+    state,
+    diffuse,
+    n,
+    z,
+    mu_t,
+    albedo,
+    g,
+    r2_edges,
+    sin2_edges,
+    unscattered,
+    absorbed,
+    radial,
+    angular,
+):
     """Walk photons from `state` on, add their weights, and return the next state.
 
-    Layers i = 0 .. L-1 lie between depths z[i] and z[i + 1], mm; n is (L + 2,) with what lies above and below at its ends;
-    mu_t (1/mm), albedo and g are (L,). Light enters at the origin, straight down or (diffuse) cosine-distributed from above.
-    unscattered (2,): light that left above (mirrored at once or later) and below without being scattered. absorbed (L,).
-    radial (4, bins + 1): light scattered once that left above, more than once above, once below, more than once below,
-    by r^2; the last bin is all beyond. angular (2, bins): scattered light above and below by the squared sine of its exit angle.
+    Layers i = 0 .. L-1 lie between depths z[i] and z[i + 1], mm; n is (L + 2,) with what lies above
+    and below at its ends; mu_t (1/mm), albedo and g are (L,). Light enters at the origin, straight
+    down or (diffuse) cosine-distributed from above. unscattered (2,): light that left above
+    (mirrored at once or later) and below without being scattered. absorbed (L,). radial (4, bins +
+    1): light scattered once that left above, more than once above, once below, more than once
+    below, by r^2; the last bin is all beyond. angular (2, bins): scattered light above and below by
+    the squared sine of its exit angle.
 
-    Every weight that is launched is added somewhere: what roulette takes is absorbed, what it gives is absorbed negatively,
-    so the sums are conserved to rounding while their means do not change.
+    Every weight that is launched is added somewhere: what roulette takes is absorbed, what it gives
+    is absorbed negatively, so the sums are conserved to rounding while their means do not change.
     """
     last = len(mu_t) - 1
     for _ in range(photons):
@@ -122,7 +150,9 @@ def walk(photons, state, diffuse, n, z, mu_t, albedo, g, r2_edges, sin2_edges, u
         if diffuse:
             state, bits = _bits(state)
             cosine = math.sqrt(1 - _uniform(bits))
-            ux = math.sqrt(1 - cosine * cosine) * n[0] / n[1]  # all is round about the axis, so any azimuth will do
+            ux = (
+                math.sqrt(1 - cosine * cosine) * n[0] / n[1]
+            )  # all is round about the axis, so any azimuth will do
         mirrored, uz = fresnel(n[0], n[1], cosine)
         unscattered[0] += mirrored
         weight = 1 - mirrored
@@ -162,7 +192,9 @@ def walk(photons, state, diffuse, n, z, mu_t, albedo, g, r2_edges, sin2_edges, u
                 s *= sine
                 if mean_cos == 0:
                     ux, uy, uz = c, s, cosine
-                else:  # a frame about the old direction: Duff et al. 2017, "Building an orthonormal basis, revisited"
+                # a frame about the old direction: Duff et al. 2017, "Building an orthonormal basis,
+                # revisited"
+                else:
                     sign = math.copysign(1.0, uz)
                     a = -1 / (sign + uz)
                     b = ux * uy * a
@@ -195,11 +227,19 @@ def walk(photons, state, diffuse, n, z, mu_t, albedo, g, r2_edges, sin2_edges, u
                     unscattered[below] += weight
                 else:
                     radial[2 * below + (order > 1), _bin(r2_edges, x * x + y * y)] += weight
-                    angular[below, min(_bin(sin2_edges, 1 - cosine * cosine), angular.shape[1] - 1)] += weight
+                    angular[
+                        below, min(_bin(sin2_edges, 1 - cosine * cosine), angular.shape[1] - 1)
+                    ] += weight
                 break
             ux *= n1 / n2
             uy *= n1 / n2
             uz = math.copysign(cosine, uz)
             layer, entered = beyond, weight
-            top, bottom, mu, alpha, mean_cos = z[layer], z[layer + 1], mu_t[layer], albedo[layer], g[layer]
+            top, bottom, mu, alpha, mean_cos = (
+                z[layer],
+                z[layer + 1],
+                mu_t[layer],
+                albedo[layer],
+                g[layer],
+            )
     return state

@@ -1,4 +1,7 @@
-"""All techniques, in one literal table. Technique number eleven: its two files, this table, its test."""
+"""All techniques, in one literal table.
+
+Technique number eleven: its two files, this table, its test.
+"""
 
 from __future__ import annotations
 
@@ -29,5 +32,8 @@ def make(name: str, parameters: dict | None = None) -> Technique:
     known = [f.name for f in dataclasses.fields(kind)]
     for key in parameters or {}:
         if key not in known:
-            raise InputError(f"{name} has no parameter {key!r}; expected one of {', '.join(known) or 'none at all'}")
+            raise InputError(
+                f"{name} has no parameter {key!r}; expected one of "
+                f"{', '.join(known) or 'none at all'}"
+            )
     return kind(**(parameters or {}))

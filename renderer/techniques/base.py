@@ -1,4 +1,6 @@
-"""What every technique is: frozen, validated parameters and one pure pass, irradiance in, scattered irradiance out."""
+"""What every technique is: frozen, validated parameters and one pure pass, irradiance in, scattered
+irradiance out.
+"""
 
 from __future__ import annotations
 
@@ -12,18 +14,30 @@ from OpenGL import GL
 from renderer.errors import InputError
 
 
-def parameter(default, *, unit: str, source: str, low: float | None = None, high: float | None = None, choices: tuple = ()):
+def parameter(
+    default,
+    *,
+    unit: str,
+    source: str,
+    low: float | None = None,
+    high: float | None = None,
+    choices: tuple = (),
+):
     """A dataclass field with its unit, range (or choices) and source."""
-    return field(default=default, metadata={"unit": unit, "source": source, "low": low, "high": high, "choices": choices})
+    return field(
+        default=default,
+        metadata={"unit": unit, "source": source, "low": low, "high": high, "choices": choices},
+    )
 
 
 @dataclass(frozen=True)
 class Inputs:
     """The shared buffers, all (height, width) at the resolution at which scattering is computed.
 
-    irradiance: RGBA32F, rgb = E, alpha = 1 on scattering material. depth_normal: RGBA32F, x = view depth in mm
-    (0 where nothing is), yzw = view-space normal. pixels_per_mm: pixels of this resolution per mm at 1 mm distance.
-    supersample: pixels of this resolution per output pixel, along one side.
+    irradiance: RGBA32F, rgb = E, alpha = 1 on scattering material. depth_normal: RGBA32F, x = view
+    depth in mm (0 where nothing is), yzw = view-space normal. pixels_per_mm: pixels of this
+    resolution per mm at 1 mm distance. supersample: pixels of this resolution per output pixel,
+    along one side.
     """
 
     context: object
@@ -38,14 +52,20 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Scattered:
-    """target.textures[0]: RGBA32F scattered irradiance; [1]: RGBA16F, x = samples taken, y = contrast (where it is measured)."""
+    """target.textures[0]: RGBA32F scattered irradiance; [1]: RGBA16F, x = samples taken, y =
+    contrast (where it is measured).
+    """
 
     target: object
 
 
 @dataclass(frozen=True)
 class Technique:
-    """Base of all techniques. `translucent`: transmitted light is added before scattering; `measures_contrast`: it writes contrast."""
+    """Base of all techniques.
+
+    `translucent`: transmitted light is added before scattering; `measures_contrast`: it writes
+    contrast.
+    """
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -59,7 +79,10 @@ class Technique:
             where = f"{self.name}.{f.name}"
             if meta["choices"]:
                 if value not in meta["choices"]:
-                    raise InputError(f"{where} is {value!r}; expected one of {', '.join(map(repr, meta['choices']))}")
+                    raise InputError(
+                        f"{where} is {value!r}; expected one of "
+                        f"{', '.join(map(repr, meta['choices']))}"
+                    )
                 continue
             kind = type(f.default)
             values = value if isinstance(value, (tuple, list)) else (value,)
@@ -69,19 +92,30 @@ class Technique:
                 kind = float
                 object.__setattr__(self, f.name, tuple(value))
             for x in values:
-                good = isinstance(x, bool) if kind is bool else isinstance(x, (int, float)) and not isinstance(x, bool) and np.isfinite(x)
+                good = (
+                    isinstance(x, bool)
+                    if kind is bool
+                    else isinstance(x, (int, float)) and not isinstance(x, bool) and np.isfinite(x)
+                )
                 if kind is int:
                     good = good and x == int(x)
                 if not good:
-                    raise InputError(f"{where} is {value!r}; expected {'true or false' if kind is bool else 'an integer' if kind is int else 'a number'}")
+                    words = {bool: "true or false", int: "an integer"}.get(kind, "a number")
+                    raise InputError(f"{where} is {value!r}; expected {words}")
                 if kind is not bool and not (meta["low"] <= x <= meta["high"]):
-                    raise InputError(f"{where} is {value!r} {meta['unit']}; expected {meta['low']} to {meta['high']}")
+                    raise InputError(
+                        f"{where} is {value!r} {meta['unit']}; expected {meta['low']} to "
+                        f"{meta['high']}"
+                    )
             if kind is int:
                 object.__setattr__(self, f.name, int(value))
 
     def parameters(self) -> dict:
         """The parameters as plain values, for the manifest."""
-        return {f.name: list(v) if isinstance(v := getattr(self, f.name), tuple) else v for f in dataclasses.fields(self)}
+        return {
+            f.name: list(v) if isinstance(v := getattr(self, f.name), tuple) else v
+            for f in dataclasses.fields(self)
+        }
 
     def self_check(self) -> None:
         """Raise AssertionError if the kernel is not what the paper says."""
@@ -92,5 +126,7 @@ class Technique:
 
 
 def output_formats() -> list[int]:
-    """Formats of the final target of every technique: scattered irradiance, then samples and contrast."""
+    """Formats of the final target of every technique: scattered irradiance, then samples and
+    contrast.
+    """
     return [GL.GL_RGBA32F, GL.GL_RGBA16F]

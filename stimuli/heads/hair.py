@@ -1,4 +1,6 @@
-"""Generated strands: scalp, brows, lashes, stubble and the fine hair of the cheeks. Every draw comes from one seed."""
+"""Generated strands: scalp, brows, lashes, stubble and the fine hair of the cheeks. Every draw
+comes from one seed.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ import trimesh
 
 from renderer.scene import MASKS, Strands
 from stimuli.heads.mpfb import Anatomy
-from stimuli.heads.skin import HEAD_AXIS_Z, azimuth, smoothstep
+from stimuli.heads.skin import azimuth, smoothstep
 
 POINTS = 7
 BROWN = np.array([0.055, 0.032, 0.019])  # linear albedo of the fibre, dark brown
@@ -30,7 +32,9 @@ class Scalp:
 
 @dataclass(frozen=True)
 class Roots:
-    """points, normals (S, 3); vertex (S,) nearest corner; weight (S, 3) and corner (S, 3) of the triangle."""
+    """points, normals (S, 3); vertex (S,) nearest corner; weight (S, 3) and corner (S, 3) of the
+    triangle.
+    """
 
     points: np.ndarray
     normals: np.ndarray
@@ -69,28 +73,58 @@ def _tangential(vector: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-6)
 
 
-def grow(roots: Roots, flow: np.ndarray, length: np.ndarray, lift: np.ndarray, bend: np.ndarray, rng: np.random.Generator,
-         frizz: float = 0.0) -> np.ndarray:
-    """Strands (S, POINTS, 3): start `lift` radians above the skin along `flow` (S, 3), and lie down by `bend` radians."""
+def grow(
+    roots: Roots,
+    flow: np.ndarray,
+    length: np.ndarray,
+    lift: np.ndarray,
+    bend: np.ndarray,
+    rng: np.random.Generator,
+    frizz: float = 0.0,
+) -> np.ndarray:
+    """Strands (S, POINTS, 3): start `lift` radians above the skin along `flow` (S, 3), and lie down
+    by `bend` radians.
+    """
     s = np.linspace(0, 1, POINTS)
     angle = lift[:, None] - bend[:, None] * s[None]
-    step = np.cos(angle)[..., None] * flow[:, None] + np.sin(angle)[..., None] * roots.normals[:, None]
+    step = (
+        np.cos(angle)[..., None] * flow[:, None] + np.sin(angle)[..., None] * roots.normals[:, None]
+    )
     if frizz:
-        step += frizz * np.cumsum(rng.normal(size=(len(length), POINTS, 3)), axis=1) / np.sqrt(POINTS)
+        step += (
+            frizz * np.cumsum(rng.normal(size=(len(length), POINTS, 3)), axis=1) / np.sqrt(POINTS)
+        )
     step *= (length / (POINTS - 1))[:, None, None]
-    offsets = np.concatenate([np.zeros((len(length), 1, 3)), np.cumsum(step[:, :-1], axis=1)], axis=1)
+    offsets = np.concatenate(
+        [np.zeros((len(length), 1, 3)), np.cumsum(step[:, :-1], axis=1)], axis=1
+    )
     return roots.points[:, None] + offsets
 
 
 def _noise(p: np.ndarray, scale: float, phase: float) -> np.ndarray:
     """Smooth vector field (N, 3) in about [-1, 1]."""
     q = p / scale + phase
-    return np.stack([np.sin(q @ [1.0, 1.7, -0.6]) + 0.7 * np.sin(q @ [-2.1, 0.9, 1.4] + 1), np.sin(q @ [0.8, -1.2, 1.9] + 2) + 0.7 * np.sin(q @ [1.9, 1.6, 0.4]),
-                     np.sin(q @ [1.5, 0.7, 1.1] + 4) + 0.7 * np.sin(q @ [-0.6, 2.3, -1.3] + 3)], axis=1) / 1.5
+    return (
+        np.stack(
+            [
+                np.sin(q @ [1.0, 1.7, -0.6]) + 0.7 * np.sin(q @ [-2.1, 0.9, 1.4] + 1),
+                np.sin(q @ [0.8, -1.2, 1.9] + 2) + 0.7 * np.sin(q @ [1.9, 1.6, 0.4]),
+                np.sin(q @ [1.5, 0.7, 1.1] + 4) + 0.7 * np.sin(q @ [-0.6, 2.3, -1.3] + 3),
+            ],
+            axis=1,
+        )
+        / 1.5
+    )
 
 
 def _pack(points, width, colour, cover, vertex) -> dict:
-    return dict(points=points, width_mm=width, colour=colour, cover=cover, root_vertex=vertex)
+    return {
+        "points": points,
+        "width_mm": width,
+        "colour": colour,
+        "cover": cover,
+        "root_vertex": vertex,
+    }
 
 
 def scalp_hair(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int) -> dict:
@@ -103,10 +137,20 @@ def scalp_hair(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: 
     side = np.sign(p[:, 0])[:, None] * [1.0, 0, 0]
     forward = np.array([0.35, 0.0, 1.0]) + 0.0 * p
     down = np.array([0, -1.0, -0.45]) + 0.15 * side
-    flow = _tangential(on_top[:, None] * forward + (1 - on_top)[:, None] * down + 0.30 * _noise(p, 16, 0.3) + 0.22 * _noise(p, 5, 2.0)
-                       + 0.20 * rng.normal(size=p.shape), n)
+    flow = _tangential(
+        on_top[:, None] * forward
+        + (1 - on_top)[:, None] * down
+        + 0.30 * _noise(p, 16, 0.3)
+        + 0.22 * _noise(p, 5, 2.0)
+        + 0.20 * rng.normal(size=p.shape),
+        n,
+    )
     hair = roots.at(scalp.column("hair"))
-    length = (4.5 + 8.0 * smoothstep(-60, 60, up) + 16.0 * on_top) * (0.75 + 0.25 * hair) * rng.uniform(0.7, 1.1, count)
+    length = (
+        (4.5 + 8.0 * smoothstep(-60, 60, up) + 16.0 * on_top)
+        * (0.75 + 0.25 * hair)
+        * rng.uniform(0.7, 1.1, count)
+    )
     # the front edge is short and fine
     length *= 0.45 + 0.55 * hair
     lift = np.radians(24 + 14 * on_top + 8 * rng.normal(size=count))
@@ -115,7 +159,13 @@ def scalp_hair(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: 
     height = np.einsum("spj,sj->sp", points - p[:, None], n)
     cover = np.clip(1 - height / layer[:, None], 0, 1)
     tone = np.exp(0.25 * rng.normal(size=(count, 1)))
-    return _pack(points, np.full(count, 0.095) * (0.6 + 0.4 * hair), BROWN * tone * (1 + 0.25 * _noise(p, 12, 5)[:, :1]), cover, roots.vertex)
+    return _pack(
+        points,
+        np.full(count, 0.095) * (0.6 + 0.4 * hair),
+        BROWN * tone * (1 + 0.25 * _noise(p, 12, 5)[:, :1]),
+        cover,
+        roots.vertex,
+    )
 
 
 class Projector:
@@ -133,9 +183,14 @@ class Projector:
             raise ValueError("a brow root misses the face; the landmarks do not fit this head")
         corners = self._scalp.faces[face]
         a, b, c = (self._scalp.positions[corners[:, k], :2] for k in range(3))
-        area = lambda p, q, r: (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0])  # noqa: E731
+        area = lambda p, q, r: (
+            (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0])
+        )
         whole = area(a, b, c)
-        weights = np.column_stack([area(xy, b, c), area(a, xy, c), area(a, b, xy)]) / np.where(np.abs(whole) < 1e-12, 1e-12, whole)[:, None]
+        weights = (
+            np.column_stack([area(xy, b, c), area(a, xy, c), area(a, b, xy)])
+            / np.where(np.abs(whole) < 1e-12, 1e-12, whole)[:, None]
+        )
         return _roots(self._scalp, corners, np.clip(weights, 0, 1))
 
 
@@ -146,15 +201,45 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int = 800)
         side = np.sign(centre[0])
         u = rng.beta(1.35, 1.30, count)
         x = -17.0 + 41.0 * u
-        arc = 14.0 + 7.4 * np.sin(np.pi * np.clip(0.06 + 0.80 * u, 0, 1)) - 5.0 * smoothstep(0.74, 1.0, u)
+        arc = (
+            14.0
+            + 7.4 * np.sin(np.pi * np.clip(0.06 + 0.80 * u, 0, 1))
+            - 5.0 * smoothstep(0.74, 1.0, u)
+        )
         half = 4.0 * (1 - 0.72 * smoothstep(0.35, 1.0, u)) * smoothstep(-0.12, 0.22, u)
         v = np.clip(rng.normal(size=count) * 0.52, -1, 1)
         roots = project.roots(np.column_stack([centre[0] + side * x, centre[1] + arc + half * v]))
-        tilt = np.radians(62 * (1 - smoothstep(0.0, 0.35, u)) + 14 - 34 * smoothstep(0.55, 1.0, u)) - 0.35 * v + 0.16 * rng.normal(size=count)
-        flow = _tangential(np.column_stack([side * np.cos(tilt), np.sin(tilt), np.zeros(count)]), roots.normals)
-        length = rng.uniform(4.5, 8.0, count) * (0.75 + 0.3 * smoothstep(0.0, 0.3, u)) * (1 - 0.35 * smoothstep(0.7, 1.0, u))
-        points = grow(roots, flow, length, np.radians(rng.uniform(10, 24, count)), np.radians(np.full(count, 16.0)), rng, frizz=0.05)
-        out.append(_pack(points, rng.uniform(0.045, 0.075, count), BROWN * 1.6 * np.exp(0.25 * rng.normal(size=(count, 1))), np.full((count, POINTS), 0.25), roots.vertex))
+        tilt = (
+            np.radians(62 * (1 - smoothstep(0.0, 0.35, u)) + 14 - 34 * smoothstep(0.55, 1.0, u))
+            - 0.35 * v
+            + 0.16 * rng.normal(size=count)
+        )
+        flow = _tangential(
+            np.column_stack([side * np.cos(tilt), np.sin(tilt), np.zeros(count)]), roots.normals
+        )
+        length = (
+            rng.uniform(4.5, 8.0, count)
+            * (0.75 + 0.3 * smoothstep(0.0, 0.3, u))
+            * (1 - 0.35 * smoothstep(0.7, 1.0, u))
+        )
+        points = grow(
+            roots,
+            flow,
+            length,
+            np.radians(rng.uniform(10, 24, count)),
+            np.radians(np.full(count, 16.0)),
+            rng,
+            frizz=0.05,
+        )
+        out.append(
+            _pack(
+                points,
+                rng.uniform(0.045, 0.075, count),
+                BROWN * 1.6 * np.exp(0.25 * rng.normal(size=(count, 1))),
+                np.full((count, POINTS), 0.25),
+                roots.vertex,
+            )
+        )
     return out
 
 
@@ -176,40 +261,104 @@ def lashes(anatomy: Anatomy, scalp: Scalp, rng: np.random.Generator) -> list[dic
         at = np.column_stack([ball.centre[0] + x, np.polyval(fit[0], x), np.polyval(fit[1], x)])
         outward = (at - ball.centre) / np.linalg.norm(at - ball.centre, axis=1, keepdims=True)
         splay = side * (x * side + 3) / 16.0
-        direction = outward * [1.0, 0.35, 1.0] + np.column_stack([0.55 * splay + 0.16 * rng.normal(size=count), np.full(count, -0.22 if upper else -0.45), np.zeros(count)])
+        direction = outward * [1.0, 0.35, 1.0] + np.column_stack(
+            [
+                0.55 * splay + 0.16 * rng.normal(size=count),
+                np.full(count, -0.22 if upper else -0.45),
+                np.zeros(count),
+            ]
+        )
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        length = (rng.uniform(5.5, 8.5, count) if upper else rng.uniform(3.0, 5.0, count)) * (0.75 + 0.25 * (x * side - low) / (high - low))
+        length = (rng.uniform(5.5, 8.5, count) if upper else rng.uniform(3.0, 5.0, count)) * (
+            0.75 + 0.25 * (x * side - low) / (high - low)
+        )
         s = np.linspace(0, 1, POINTS)
         curl = np.array([0, 1.0 if upper else -0.35, 0.0])
-        points = at[:, None] + length[:, None, None] * (s[None, :, None] * direction[:, None] + (0.62 * s**2)[None, :, None] * curl)
+        points = at[:, None] + length[:, None, None] * (
+            s[None, :, None] * direction[:, None] + (0.62 * s**2)[None, :, None] * curl
+        )
         points += 0.07 * rng.normal(size=(count, 1, 3)) * length[:, None, None] * s[None, :, None]
-        out.append(_pack(points, np.full(count, 0.060 if upper else 0.045), np.tile(BROWN * 0.7, (count, 1)), np.full((count, POINTS), 0.2), tree.query(at)[1]))
+        out.append(
+            _pack(
+                points,
+                np.full(count, 0.060 if upper else 0.045),
+                np.tile(BROWN * 0.7, (count, 1)),
+                np.full((count, POINTS), 0.2),
+                tree.query(at)[1],
+            )
+        )
     return out
 
 
 def stubble(scalp: Scalp, rng: np.random.Generator, count: int) -> dict:
     """A day's beard."""
     roots = scatter_roots(scalp, scalp.column("beard") ** 1.3, count, rng)
-    flow = _tangential(np.array([0, -1.0, 0.1]) + 0.5 * _noise(roots.points, 14, 1.0) + 0.35 * rng.normal(size=roots.points.shape), roots.normals)
+    flow = _tangential(
+        np.array([0, -1.0, 0.1])
+        + 0.5 * _noise(roots.points, 14, 1.0)
+        + 0.35 * rng.normal(size=roots.points.shape),
+        roots.normals,
+    )
     length = rng.uniform(0.35, 1.1, count)
     points = grow(roots, flow, length, np.radians(rng.uniform(25, 60, count)), np.zeros(count), rng)
-    return _pack(points, rng.uniform(0.05, 0.08, count), BROWN * 1.3 * np.exp(0.3 * rng.normal(size=(count, 1))), np.zeros((count, POINTS)), roots.vertex)
+    return _pack(
+        points,
+        rng.uniform(0.05, 0.08, count),
+        BROWN * 1.3 * np.exp(0.3 * rng.normal(size=(count, 1))),
+        np.zeros((count, POINTS)),
+        roots.vertex,
+    )
 
 
 def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int) -> dict:
     """Fine pale hair on the cheeks, the ears and the forehead: seen against the light."""
     p = scalp.positions
-    density = (1 - scalp.column("hair")) * (1 - scalp.column("lips")) * (1 - scalp.column("inside")) * smoothstep(-130, -100, p[:, 1] - eyes[1])
+    density = (
+        (1 - scalp.column("hair"))
+        * (1 - scalp.column("lips"))
+        * (1 - scalp.column("inside"))
+        * smoothstep(-130, -100, p[:, 1] - eyes[1])
+    )
     roots = scatter_roots(scalp, density, count, rng)
-    flow = _tangential(np.array([0, -1.0, -0.3]) + 0.4 * _noise(roots.points, 18, 7.0) + 0.3 * rng.normal(size=roots.points.shape), roots.normals)
-    points = grow(roots, flow, rng.uniform(0.8, 2.0, count), np.radians(rng.uniform(20, 50, count)), np.radians(np.full(count, 20.0)), rng)
-    return _pack(points, np.full(count, 0.009), np.tile([0.22, 0.15, 0.10], (count, 1)), np.zeros((count, POINTS)), roots.vertex)
+    flow = _tangential(
+        np.array([0, -1.0, -0.3])
+        + 0.4 * _noise(roots.points, 18, 7.0)
+        + 0.3 * rng.normal(size=roots.points.shape),
+        roots.normals,
+    )
+    points = grow(
+        roots,
+        flow,
+        rng.uniform(0.8, 2.0, count),
+        np.radians(rng.uniform(20, 50, count)),
+        np.radians(np.full(count, 20.0)),
+        rng,
+    )
+    return _pack(
+        points,
+        np.full(count, 0.009),
+        np.tile([0.22, 0.15, 0.10], (count, 1)),
+        np.zeros((count, POINTS)),
+        roots.vertex,
+    )
 
 
 def all_strands(anatomy: Anatomy, scalp: Scalp, seed: int, share: float = 1.0) -> Strands:
     """Every strand of the head; share scales the numbers (tests use few)."""
     rng = np.random.default_rng([seed, 11])
     eyes = anatomy.landmarks["eyes"]
-    parts = [scalp_hair(scalp, eyes, rng, int(78000 * share)), *brows(scalp, [e.centre for e in anatomy.eyes], rng, int(820 * share)),
-             *lashes(anatomy, scalp, rng), stubble(scalp, rng, int(9000 * share)), vellus(scalp, eyes, rng, int(16000 * share))]
-    return Strands(**{key: np.concatenate([part[key] for part in parts]).astype(np.float32 if key != "root_vertex" else np.int64) for key in parts[0]})
+    parts = [
+        scalp_hair(scalp, eyes, rng, int(78000 * share)),
+        *brows(scalp, [e.centre for e in anatomy.eyes], rng, int(820 * share)),
+        *lashes(anatomy, scalp, rng),
+        stubble(scalp, rng, int(9000 * share)),
+        vellus(scalp, eyes, rng, int(16000 * share)),
+    ]
+    return Strands(
+        **{
+            key: np.concatenate([part[key] for part in parts]).astype(
+                np.float32 if key != "root_vertex" else np.int64
+            )
+            for key in parts[0]
+        }
+    )

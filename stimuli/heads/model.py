@@ -12,7 +12,9 @@ from stimuli.heads.subdivide import triangles
 
 
 def _split(bust: Bust) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices split along UV seams: index of the position (N,), of the uv (N,), and triangles (M, 3) into them."""
+    """Vertices split along UV seams: index of the position (N,), of the uv (N,), and triangles (M,
+    3) into them.
+    """
     pairs = np.stack([triangles(bust.quads).ravel(), triangles(bust.uv_quads).ravel()], axis=1)
     unique, index = np.unique(pairs, axis=0, return_inverse=True)
     return unique[:, 0], unique[:, 1], index.reshape(-1, 3)
@@ -25,13 +27,32 @@ def default_model(anatomy: Anatomy, seed: int, hair_share: float = 1.0) -> Model
     where, uv, faces = _split(fine)
     coarse_mask = skin.masks(anatomy, coarse)
     proxy_faces = triangles(coarse.quads)
-    pick = sparse.csr_matrix((np.ones(len(where)), (np.arange(len(where)), where)), (len(where), len(fine.positions)))
-    proxy = Proxy(coarse.positions, coarse.normals, proxy_faces, skin.mean_albedo(coarse_mask), (pick @ anatomy.to_fine).tocsr())
-    surface = Skin(fine.positions[where].astype(np.float32), fine.normals[where].astype(np.float32), fine.uvs[uv].astype(np.float32),
-                   faces.astype(np.uint32), mask[where], proxy)
+    pick = sparse.csr_matrix(
+        (np.ones(len(where)), (np.arange(len(where)), where)), (len(where), len(fine.positions))
+    )
+    proxy = Proxy(
+        coarse.positions,
+        coarse.normals,
+        proxy_faces,
+        skin.mean_albedo(coarse_mask),
+        (pick @ anatomy.to_fine).tocsr(),
+    )
+    surface = Skin(
+        fine.positions[where].astype(np.float32),
+        fine.normals[where].astype(np.float32),
+        fine.uvs[uv].astype(np.float32),
+        faces.astype(np.uint32),
+        mask[where],
+        proxy,
+    )
     scalp = hair.Scalp(fine.positions[where], fine.normals[where], faces, mask[where])
     landmarks = dict(anatomy.landmarks, eye_l=anatomy.eyes[0].centre, eye_r=anatomy.eyes[1].centre)
-    return Model(surface, tuple(eyes.eyeball(ball) for ball in anatomy.eyes), hair.all_strands(anatomy, scalp, seed, hair_share), landmarks)
+    return Model(
+        surface,
+        tuple(eyes.eyeball(ball) for ball in anatomy.eyes),
+        hair.all_strands(anatomy, scalp, seed, hair_share),
+        landmarks,
+    )
 
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
@@ -40,8 +61,12 @@ SKIN_COLOUR = (0.56, 0.38, 0.30)  # linear albedo of a scan without any colour o
 EYES_BELOW_CROWN_MM = 112.0  # half an adult head's height
 
 
-def _clustered(positions: np.ndarray, normals: np.ndarray, faces: np.ndarray, albedo: np.ndarray) -> Proxy:
-    """A proxy of one vertex per CLUSTER_MM cell; each full vertex takes its light from the three nearest that face its way."""
+def _clustered(
+    positions: np.ndarray, normals: np.ndarray, faces: np.ndarray, albedo: np.ndarray
+) -> Proxy:
+    """A proxy of one vertex per CLUSTER_MM cell; each full vertex takes its light from the three
+    nearest that face its way.
+    """
     from scipy.spatial import cKDTree
 
     cell = np.floor(positions / CLUSTER_MM).astype(np.int64)
@@ -51,16 +76,30 @@ def _clustered(positions: np.ndarray, normals: np.ndarray, faces: np.ndarray, al
     mean = sparse.csr_matrix((np.ones(len(of)), (of, np.arange(len(of)))), (count, len(of)))
     mean = sparse.diags(1 / np.asarray(mean.sum(axis=1)).ravel()) @ mean
     small = of[faces]
-    small = small[(small[:, 0] != small[:, 1]) & (small[:, 1] != small[:, 2]) & (small[:, 2] != small[:, 0])]
+    small = small[
+        (small[:, 0] != small[:, 1]) & (small[:, 1] != small[:, 2]) & (small[:, 2] != small[:, 0])
+    ]
     centre, normal = mean @ positions, mean @ normals
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-    _, near = cKDTree(np.hstack([centre, 4 * CLUSTER_MM * normal])).query(np.hstack([positions, 4 * CLUSTER_MM * normals]), k=3)
+    _, near = cKDTree(np.hstack([centre, 4 * CLUSTER_MM * normal])).query(
+        np.hstack([positions, 4 * CLUSTER_MM * normals]), k=3
+    )
     rows = np.repeat(np.arange(len(positions)), 3)
-    return Proxy(centre, normal, small, mean @ albedo, sparse.csr_matrix((np.full(rows.size, 1 / 3), (rows, near.ravel())), (len(positions), count)))
+    return Proxy(
+        centre,
+        normal,
+        small,
+        mean @ albedo,
+        sparse.csr_matrix(
+            (np.full(rows.size, 1 / 3), (rows, near.ravel())), (len(positions), count)
+        ),
+    )
 
 
 def _scan_landmarks(p: np.ndarray, eye_points: np.ndarray | None) -> dict[str, np.ndarray]:
-    """Where the eyes, nose and mouth of an upright head that looks along +z must be: from its eye parts, else its proportions."""
+    """Where the eyes, nose and mouth of an upright head that looks along +z must be: from its eye
+    parts, else its proportions.
+    """
     crown = p[:, 1].max()
     head = p[p[:, 1] > crown - 200]
     middle = 0.5 * (np.quantile(head[:, 0], 0.01) + np.quantile(head[:, 0], 0.99))
@@ -73,7 +112,13 @@ def _scan_landmarks(p: np.ndarray, eye_points: np.ndarray | None) -> dict[str, n
         eyes = np.array([middle, eye_points[:, 1].mean(), eye_points[:, 2].mean()])
         apart = np.abs(eye_points[:, 0] - middle).mean()
     side = np.array([apart, 0, 0])
-    return {"eyes": eyes, "eye_l": eyes + side, "eye_r": eyes - side, "nose": nose, "mouth": np.array([middle, eyes[1] - 70, nose[2] - 12])}
+    return {
+        "eyes": eyes,
+        "eye_l": eyes + side,
+        "eye_r": eyes - side,
+        "nose": nose,
+        "mouth": np.array([middle, eyes[1] - 70, nose[2] - 12]),
+    }
 
 
 def _own_eyes(points: np.ndarray) -> tuple[Eyeball, ...]:
@@ -91,13 +136,16 @@ def _own_eyes(points: np.ndarray) -> tuple[Eyeball, ...]:
 
 
 def scan_model(scan) -> Model:
-    """A user's scan: its own maps on its skin; eyes and teeth drawn without scattering; hair as surface.
+    """A user's scan: its own maps on its skin; eyes and teeth drawn without scattering; hair as
+    surface.
 
-    Left out: clear shells over the eyes, and cards of lashes and brows, which are nothing without their alpha. Eyes without a
-    texture are replaced by the default head's.
+    Left out: clear shells over the eyes, and cards of lashes and brows, which are nothing without
+    their alpha. Eyes without a texture are replaced by the default head's.
     """
-    kinds = ["card" if kind == "hair" and ("lash" in name.lower() or "brow" in name.lower()) else kind
-             for name, kind in zip(scan.part_names, scan.part_kinds, strict=True)]
+    kinds = [
+        "card" if kind == "hair" and ("lash" in name.lower() or "brow" in name.lower()) else kind
+        for name, kind in zip(scan.part_names, scan.part_kinds, strict=True)
+    ]
     kind = np.array(kinds)[scan.parts]
     eye_faces = scan.faces[kind == "eye"]
     eye_points = scan.positions_mm[np.unique(eye_faces)].astype(float) if len(eye_faces) else None
@@ -111,13 +159,32 @@ def scan_model(scan) -> Model:
     colour = scan.base_colour or SKIN_COLOUR
     if scan.albedo is not None:
         mean = scan.albedo.reshape(-1, 3)[:: max(1, scan.albedo.size // 300_000)] / 255
-        colour = tuple(np.where(mean <= 0.04045, mean / 12.92, ((mean + 0.055) / 1.055) ** 2.4).mean(axis=0))
+        colour = tuple(
+            np.where(mean <= 0.04045, mean / 12.92, ((mean + 0.055) / 1.055) ** 2.4).mean(axis=0)
+        )
     albedo = np.tile(np.array(colour), (len(used), 1))
     if len(used) > PROXY_LIMIT:
         proxy = _clustered(positions, normals, faces, albedo)
     else:
         proxy = Proxy(positions, normals, faces, albedo, sparse.identity(len(used), format="csr"))
     uvs = np.zeros((len(used), 2)) if scan.uvs is None else scan.uvs[used]
-    surface = Skin(positions.astype(np.float32), normals.astype(np.float32), uvs.astype(np.float32), faces.astype(np.uint32),
-                   np.zeros((len(used), len(MASKS)), dtype=np.float32), proxy, scan.albedo, scan.normal_map, scan.roughness, tuple(colour), scatters)
-    return Model(surface, tuple(eyes.eyeball(ball) for ball in balls), None, _scan_landmarks(positions, eye_points), procedural=False)
+    surface = Skin(
+        positions.astype(np.float32),
+        normals.astype(np.float32),
+        uvs.astype(np.float32),
+        faces.astype(np.uint32),
+        np.zeros((len(used), len(MASKS)), dtype=np.float32),
+        proxy,
+        scan.albedo,
+        scan.normal_map,
+        scan.roughness,
+        tuple(colour),
+        scatters,
+    )
+    return Model(
+        surface,
+        tuple(eyes.eyeball(ball) for ball in balls),
+        None,
+        _scan_landmarks(positions, eye_points),
+        procedural=False,
+    )

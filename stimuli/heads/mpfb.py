@@ -1,4 +1,5 @@
-"""The default head: MakeHuman/MPFB2's base mesh (CC0), morphed, posed, cropped to a bust and subdivided.
+"""The default head: MakeHuman/MPFB2's base mesh (CC0), morphed, posed, cropped to a bust and
+subdivided.
 
 The base mesh stands with its arms out, is measured in decimetres and looks along +z, y up.
 Everything here leaves in millimetres.
@@ -18,7 +19,8 @@ from stimuli.heads import subdivide
 
 MM_PER_UNIT = 100.0
 
-# The character: a man of about forty. Names are paths below `targets/`, values are weights in [0, 1].
+# The character: a man of about forty. Names are paths below `targets/`, values are weights in [0,
+# 1].
 CHARACTER: dict[str, float] = {
     "macrodetails/caucasian-male-young": 0.62,
     "macrodetails/caucasian-male-old": 0.23,
@@ -26,25 +28,43 @@ CHARACTER: dict[str, float] = {
     "macrodetails/asian-male-young": 0.07,
     "macrodetails/universal-male-young-averagemuscle-averageweight": 0.77,
     "macrodetails/universal-male-old-averagemuscle-averageweight": 0.23,
-    "eyes/l-eye-scale-decr": 0.42, "eyes/r-eye-scale-decr": 0.42,
-    "eyes/l-eye-height2-incr": 0.30, "eyes/r-eye-height2-incr": 0.34,
-    "eyes/l-eye-bag-incr": 0.35, "eyes/r-eye-bag-incr": 0.40,
-    "eyes/l-eye-eyefold-up": 0.12, "eyes/r-eye-eyefold-up": 0.15,
-    "head/head-oval": 0.25, "head/head-fat-decr": 0.10,
+    "eyes/l-eye-scale-decr": 0.42,
+    "eyes/r-eye-scale-decr": 0.42,
+    "eyes/l-eye-height2-incr": 0.30,
+    "eyes/r-eye-height2-incr": 0.34,
+    "eyes/l-eye-bag-incr": 0.35,
+    "eyes/r-eye-bag-incr": 0.40,
+    "eyes/l-eye-eyefold-up": 0.12,
+    "eyes/r-eye-eyefold-up": 0.15,
+    "head/head-oval": 0.25,
+    "head/head-fat-decr": 0.10,
     "head/head-back-scale-depth-incr": 0.15,
-    "nose/nose-hump-incr": 0.22, "nose/nose-point-down": 0.10, "nose/nose-width2-incr": 0.15,
+    "nose/nose-hump-incr": 0.22,
+    "nose/nose-point-down": 0.10,
+    "nose/nose-width2-incr": 0.15,
     "nose/nose-nostrils-width-incr": 0.15,
-    "mouth/mouth-cupidsbow-incr": 0.30, "mouth/mouth-philtrum-volume-incr": 0.35,
-    "mouth/mouth-laugh-lines-in": 0.08, "mouth/mouth-lowerlip-volume-incr": 0.15,
-    "chin/chin-cleft-incr": 0.10, "chin/chin-bones-incr": 0.20, "chin/chin-prominent-incr": 0.15,
-    "cheek/l-cheek-bones-incr": 0.30, "cheek/r-cheek-bones-incr": 0.25,
+    "mouth/mouth-cupidsbow-incr": 0.30,
+    "mouth/mouth-philtrum-volume-incr": 0.35,
+    "mouth/mouth-laugh-lines-in": 0.08,
+    "mouth/mouth-lowerlip-volume-incr": 0.15,
+    "chin/chin-cleft-incr": 0.10,
+    "chin/chin-bones-incr": 0.20,
+    "chin/chin-prominent-incr": 0.15,
+    "cheek/l-cheek-bones-incr": 0.30,
+    "cheek/r-cheek-bones-incr": 0.25,
     "cheek/l-cheek-inner-decr": 0.10,
     "forehead/forehead-temple-incr": 0.10,
-    "ears/l-ear-wing-incr": 0.15, "ears/r-ear-wing-incr": 0.10,
-    "asym/asym-brown-1-l": 0.25, "asym/asym-eye-4-l": 0.15, "asym/asym-nose-1-r": 0.15,
-    "asym/asym-mouth-1-l": 0.20, "asym/asym-jaw-1-r": 0.25, "asym/asym-ear-1-l": 0.2,
+    "ears/l-ear-wing-incr": 0.15,
+    "ears/r-ear-wing-incr": 0.10,
+    "asym/asym-brown-1-l": 0.25,
+    "asym/asym-eye-4-l": 0.15,
+    "asym/asym-nose-1-r": 0.15,
+    "asym/asym-mouth-1-l": 0.20,
+    "asym/asym-jaw-1-r": 0.25,
+    "asym/asym-ear-1-l": 0.2,
     "expression/units/caucasian/mouth-compression": 0.12,
-    "expression/units/caucasian/eye-left-opened-up": 0.45, "expression/units/caucasian/eye-right-opened-up": 0.42,
+    "expression/units/caucasian/eye-left-opened-up": 0.45,
+    "expression/units/caucasian/eye-right-opened-up": 0.42,
 }
 ARM_DROP_DEG = 32.0
 LEVELS = 2
@@ -53,7 +73,9 @@ CROP_BELOW_CROWN_MM = 520.0
 
 @dataclass(frozen=True)
 class Base:
-    """The base mesh as stored: positions (V, 3) in units, uvs (T, 2), body quads (F, 4) into each."""
+    """The base mesh as stored: positions (V, 3) in units, uvs (T, 2), body quads (F,
+    4) into each.
+    """
 
     positions: np.ndarray
     uvs: np.ndarray
@@ -78,8 +100,13 @@ def read_base(data: Path) -> Base:
                 corners = [corner.split("/") for corner in rest]
                 quads.append([int(c[0]) - 1 for c in corners])
                 uv_quads.append([int(c[1]) - 1 for c in corners])
-    ranges = json.loads((data / "mesh_metadata" / "basemesh_vertex_groups.json").read_text(encoding="utf-8"))
-    groups = {name: np.concatenate([np.arange(a, b + 1) for a, b in spans]) for name, spans in ranges.items()}
+    ranges = json.loads(
+        (data / "mesh_metadata" / "basemesh_vertex_groups.json").read_text(encoding="utf-8")
+    )
+    groups = {
+        name: np.concatenate([np.arange(a, b + 1) for a, b in spans])
+        for name, spans in ranges.items()
+    }
     return Base(np.array(positions), np.array(uvs), np.array(quads), np.array(uv_quads), groups)
 
 
@@ -97,14 +124,21 @@ def morph(data: Path, positions: np.ndarray, weights: dict[str, float]) -> np.nd
 
 
 def lower_arms(data: Path, base: Base, positions: np.ndarray, degrees: float) -> np.ndarray:
-    """Turn both arms down about the shoulders by linear blend skinning with the standard rig's weights."""
-    weights = json.loads((data / "rigs" / "standard" / "weights.default.json").read_text(encoding="utf-8"))["weights"]
+    """Turn both arms down about the shoulders by linear blend skinning with the standard rig's
+    weights.
+    """
+    weights = json.loads(
+        (data / "rigs" / "standard" / "weights.default.json").read_text(encoding="utf-8")
+    )["weights"]
     rig = json.loads((data / "rigs" / "standard" / "rig.default.json").read_text(encoding="utf-8"))
     bones = rig.get("bones", rig)
     result = positions.copy()
     for side, sign in (("L", 1.0), ("R", -1.0)):
         # the clavicle takes a share, so that the shoulder slopes instead of folding
-        for bone, angle in ((f"clavicle.{side}", 0.12 * degrees), (f"upperarm01.{side}", 0.88 * degrees)):
+        for bone, angle in (
+            (f"clavicle.{side}", 0.12 * degrees),
+            (f"upperarm01.{side}", 0.88 * degrees),
+        ):
             inside = {bone}
             while True:
                 more = {name for name, b in bones.items() if b.get("parent") in inside} - inside
@@ -126,9 +160,11 @@ def lower_arms(data: Path, base: Base, positions: np.ndarray, degrees: float) ->
 
 @dataclass(frozen=True)
 class Bust:
-    """The morphed bust at one subdivision level, millimetres; crown at y = 0, x and z centred on the head.
+    """The morphed bust at one subdivision level, millimetres; crown at y = 0, x and z centred on
+    the head.
 
-    positions (N, 3); normals (N, 3); quads (F, 4); uvs (T, 2); uv_quads (F, 4); masks name -> (N,) in [0, 1].
+    positions (N, 3); normals (N, 3); quads (F, 4); uvs (T, 2); uv_quads (F, 4); masks name -> (N,)
+    in [0, 1].
     """
 
     positions: np.ndarray
@@ -149,7 +185,9 @@ class Eyeball:
 
 @dataclass(frozen=True)
 class Anatomy:
-    """What the generators of skin, hair and eyes need: busts per level (coarse to fine), eyes, lash curves."""
+    """What the generators of skin, hair and eyes need: busts per level (coarse to fine), eyes, lash
+    curves.
+    """
 
     levels: list[Bust]
     to_fine: object  # sparse (N_fine, N_coarse): from levels[1] to levels[-1]
@@ -165,18 +203,28 @@ def _mask_images(data: Path) -> dict[str, np.ndarray]:
     images = {}
     for name in ("lips", "ears", "eyelids", "face", "inside-mouth"):
         with Image.open(data / "textures" / f"mpfb_{name}.jpg") as file:
-            images[name] = gaussian_filter(np.asarray(file.convert("L"), dtype=np.float32) / 255, 1.0)
+            images[name] = gaussian_filter(
+                np.asarray(file.convert("L"), dtype=np.float32) / 255, 1.0
+            )
     return images
 
 
-def _sample_masks(images: dict[str, np.ndarray], uvs: np.ndarray, uv_quads: np.ndarray, quads: np.ndarray, count: int) -> dict[str, np.ndarray]:
+def _sample_masks(
+    images: dict[str, np.ndarray],
+    uvs: np.ndarray,
+    uv_quads: np.ndarray,
+    quads: np.ndarray,
+    count: int,
+) -> dict[str, np.ndarray]:
     """The masks sampled (bilinear) at every vertex: name -> (count,) in [0, 1]."""
     from scipy.ndimage import map_coordinates
 
     masks = {}
     for name, image in images.items():
         h, w = image.shape
-        at = map_coordinates(image, [(1 - uvs[:, 1]) * h - 0.5, uvs[:, 0] * w - 0.5], order=1, mode="nearest")
+        at = map_coordinates(
+            image, [(1 - uvs[:, 1]) * h - 0.5, uvs[:, 0] * w - 0.5], order=1, mode="nearest"
+        )
         mask = np.zeros(count)
         mask[quads.ravel()] = at[uv_quads.ravel()]
         masks[name] = mask
@@ -226,7 +274,9 @@ def _landmarks(bust: Bust, eyes) -> dict[str, np.ndarray]:
     p, masks = bust.positions, bust.masks
     eye = 0.5 * (eyes[0].centre + eyes[1].centre)
     lips = p[masks["lips"] > 0.5]
-    mouth = np.array([lips[:, 0].mean(), 0.5 * (lips[:, 1].min() + lips[:, 1].max()), lips[:, 2].max()])
+    mouth = np.array(
+        [lips[:, 0].mean(), 0.5 * (lips[:, 1].min() + lips[:, 1].max()), lips[:, 2].max()]
+    )
     middle = np.abs(p[:, 0]) < 8
     between = middle & (p[:, 1] < eye[1] - 15) & (p[:, 1] > mouth[1] + 8)
     nose = p[between][p[between, 2].argmax()]
@@ -234,5 +284,13 @@ def _landmarks(bust: Bust, eyes) -> dict[str, np.ndarray]:
     chin = p[below][(p[below, 2] + 0.6 * -p[below, 1]).argmax()]
     ear_l = p[(masks["ears"] > 0.5) & (p[:, 0] > 0)].mean(axis=0)
     ear_r = p[(masks["ears"] > 0.5) & (p[:, 0] < 0)].mean(axis=0)
-    return {"eyes": eye, "mouth": mouth, "nose": nose, "chin": chin, "ear_l": ear_l, "ear_r": ear_r,
-            "mouth_l": lips[lips[:, 0].argmax()], "mouth_r": lips[lips[:, 0].argmin()]}
+    return {
+        "eyes": eye,
+        "mouth": mouth,
+        "nose": nose,
+        "chin": chin,
+        "ear_l": ear_l,
+        "ear_r": ear_r,
+        "mouth_l": lips[lips[:, 0].argmax()],
+        "mouth_r": lips[lips[:, 0].argmin()],
+    }

@@ -1,15 +1,20 @@
-"""A user's own head: one triangle mesh in millimetres from a .glb, .gltf or .obj file, or one line that says why not.
+"""A user's own head: one triangle mesh in millimetres from a .glb, .gltf or .obj file, or one line
+that says why not.
 
 What is asked of a file, for shading and occlusion to be right:
 
 * Finite positions, triangles (polygons are fanned) with an area, at least one.
-* A surface: no edge with more than two faces. Vertices count as one where they lie at exactly one place, so seams of the
-  texture do not matter; open borders are fine, scans have them. Real scans also have a few bad edges. At each of them the
-  smooth normal mixes sheets that face apart, a flaw the size of a triangle; the file is refused when more than
-  `NON_MANIFOLD_LIMIT` of all edges are bad, else they are told of. The same holds for neighbouring faces that disagree about
-  which side is out, unless the file has normals. Hair and films over the eye, by their names, are cards and exempt.
-* The size of a head, in a unit that is given, that the format lays down (glTF: metres), or that makes the size plausible.
-* Y up, the face towards +z, as glTF lays down; a file with z up (the face towards -y) is turned. For OBJ, which does not say,
+* A surface: no edge with more than two faces. Vertices count as one where they lie at exactly one
+place, so seams of the
+  texture do not matter; open borders are fine, scans have them. Real scans also have a few bad
+  edges. At each of them the smooth normal mixes sheets that face apart, a flaw the size of a
+  triangle; the file is refused when more than `NON_MANIFOLD_LIMIT` of all edges are bad, else they
+  are told of. The same holds for neighbouring faces that disagree about which side is out, unless
+  the file has normals. Hair and films over the eye, by their names, are cards and exempt.
+* The size of a head, in a unit that is given, that the format lays down (glTF: metres), or that
+makes the size plausible.
+* Y up, the face towards +z, as glTF lays down; a file with z up (the face towards -y) is turned.
+For OBJ, which does not say,
   the longer of the two is taken as the height.
 """
 
@@ -31,36 +36,54 @@ UNITS_MM = {"m": 1000.0, "cm": 10.0, "mm": 1.0, "in": 25.4}
 
 HEAD_MM = (120.0, 900.0)  # largest extent: from a face alone to a broad bust
 BODY_MM = 2300.0  # largest extent of a whole person with arms out
-SLENDER = 0.35  # a whole person's least extent is below this part of the largest; a head's or bust's is not
-Z_UP_RATIO = 1.1  # with z up, the height (z) exceeds the depth (y) by more than this; heads have 1.15 or more
+# a whole person's least extent is below this part of the largest; a head's or bust's is not
+SLENDER = 0.35
+# with z up, the height (z) exceeds the depth (y) by more than this; heads have 1.15 or more
+Z_UP_RATIO = 1.1
 NON_MANIFOLD_LIMIT = 1e-4
-"""Fraction of all edges that may have more than two faces, or (without normals) two faces that disagree."""
+"""Fraction of all edges that may have more than two faces, or (without normals) two faces that
+disagree.
+"""
 
 KINDS = {
-    "hair": "lash lashes eyelash eyelashes brow brows eyebrow eyebrows hair hairs beard moustache mustache stubble fur",
+    "hair": (
+        "lash lashes eyelash eyelashes brow brows eyebrow eyebrows hair hairs beard "
+        "moustache mustache stubble fur"
+    ),
     "shell": "occlusion blend lacrimal tear tears tearline fluid wet",
     "mouth": "teeth tooth gum gums tongue",
     "eye": "eye eyes eyeball eyeballs iris irises sclera pupil pupils cornea",
 }
-"""What a part is by the words of its name, the first that fits; `shell`: clear films over the eye that hide it if drawn opaque."""
+"""What a part is by the words of its name, the first that fits; `shell`: clear films over the eye
+that hide it if drawn opaque.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """A head as read. All vertex arrays have one length; all images are optional and of their own sizes."""
+    """A head as read.
+
+    All vertex arrays have one length; all images are optional and of their own sizes.
+    """
 
     name: str  # the file's, without suffix
     positions_mm: np.ndarray  # (N, 3) float32, y up
     faces: np.ndarray  # (M, 3) int32, counter-clockwise from outside
-    normals: np.ndarray  # (N, 3) float32, of unit length: given, or area-weighted and smooth across texture seams
+    normals: (
+        np.ndarray
+    )  # (N, 3) float32, of unit length: given, or area-weighted and smooth across texture seams
     uvs: np.ndarray | None  # (N, 2) float32, v up (OpenGL's convention); textures repeat
     albedo: np.ndarray | None  # (H, W, 3) uint8, sRGB
-    base_colour: tuple[float, float, float] | None  # linear, 0..1: the material's, where there is no albedo texture
+    base_colour: (
+        tuple[float, float, float] | None
+    )  # linear, 0..1: the material's, where there is no albedo texture
     normal_map: np.ndarray | None  # (H, W, 3) uint8, tangent space, green up
     roughness: np.ndarray | None  # (H, W) uint8, perceptual roughness, 255 is 1
     parts: np.ndarray  # (M,) int32: which part each face belongs to
     part_names: tuple[str, ...]  # of the material, else of the mesh or group
-    part_kinds: tuple[str, ...]  # skin, eye, mouth, hair or shell: by the name, skin where it says nothing
+    part_kinds: tuple[
+        str, ...
+    ]  # skin, eye, mouth, hair or shell: by the name, skin where it says nothing
     unit: str  # mm, cm, m or in
     unit_source: str  # given, format or guessed
     up: str  # y or z, in the file
@@ -69,17 +92,28 @@ class Scan:
     notes: tuple[str, ...]  # what the user should be told, one line each
 
     def provenance(self) -> dict:
-        """What a manifest records: the files by their sha256, and how they were understood. No path of the machine."""
-        understood = {name: getattr(self, name) for name in ("unit", "unit_source", "up", "up_source")}
-        return {"files": self.files, **understood, "parts": dict(zip(self.part_names, self.part_kinds, strict=True))}
+        """What a manifest records: the files by their sha256, and how they were understood. No path
+        of the machine.
+        """
+        understood = {
+            name: getattr(self, name) for name in ("unit", "unit_source", "up", "up_source")
+        }
+        return {
+            "files": self.files,
+            **understood,
+            "parts": dict(zip(self.part_names, self.part_kinds, strict=True)),
+        }
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what is not finite is refused, and needs no warning besides
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # what is not finite is refused, and needs no warning besides
 def read_scan(path: str | Path, unit: str | None = None, up: str | None = None) -> Scan:
     """Read a head from a .glb, .gltf or .obj file with its textures.
 
-    `unit` is that of the file's positions (mm, cm, m or in) and `up` its upward axis (y or z); None has them taken from the
-    format or found out, and said in the notes. Whatever keeps the head from being used raises one line (`InputError`).
+    `unit` is that of the file's positions (mm, cm, m or in) and `up` its upward axis (y or z); None
+    has them taken from the format or found out, and said in the notes. Whatever keeps the head from
+    being used raises one line (`InputError`).
     """
     source = Source(Path(path))
     reader = READERS.get(source.path.suffix.lower())
@@ -103,14 +137,19 @@ def read_scan(path: str | Path, unit: str | None = None, up: str | None = None) 
     names = tuple(dict.fromkeys(part.name for part in parts))
     kinds = tuple(map(part_kind, names))
     if "skin" not in kinds:
-        source.note(f"all of it was taken as skin, since its only parts are named {', '.join(map(repr, names[:4]))}")
+        source.note(
+            "all of it was taken as skin, since its only parts are named "
+            f"{', '.join(map(repr, names[:4]))}"
+        )
         kinds = ("skin",) * len(names)
     mesh = _join(parts, names, kinds)
 
     of_format = reader is gltf.read
     up, up_source = _upward(source, mesh.extents(), up, of_format)
     if up == "z":
-        mesh.positions, mesh.normals = (vectors[:, [0, 2, 1]] * (1, 1, -1) for vectors in (mesh.positions, mesh.normals))
+        mesh.positions, mesh.normals = (
+            vectors[:, [0, 2, 1]] * (1, 1, -1) for vectors in (mesh.positions, mesh.normals)
+        )
     unit, unit_source = _unit(source, mesh.extents(), unit, of_format)
     mesh.positions = (mesh.positions * UNITS_MM[unit]).astype(np.float32)
 
@@ -157,7 +196,9 @@ class _Mesh:
     normals: np.ndarray  # (n, 3), of any length; not finite where none were given
     uvs: np.ndarray | None  # (n, 2)
     part_of_face: np.ndarray  # (m,)
-    group: np.ndarray  # (n,) int32: vertices are welded within it; all skin is one group, each other part its own
+    group: (
+        np.ndarray
+    )  # (n,) int32: vertices are welded within it; all skin is one group, each other part its own
 
     def extents(self) -> np.ndarray:
         """The sides (3,) of the bounding box of all faces."""
@@ -165,7 +206,9 @@ class _Mesh:
 
     @cached_property
     def points(self) -> np.ndarray:
-        """An index (n,) for each vertex, the same where vertices of one group lie at exactly one place."""
+        """An index (n,) for each vertex, the same where vertices of one group lie at exactly one
+        place.
+        """
         keys = np.empty((len(self.positions), 4), np.int32)
         keys[:, :3] = (self.positions + np.float32(0)).view(np.int32)  # adding 0 makes -0 and 0 one
         keys[:, 3] = self.group
@@ -186,12 +229,21 @@ def _join(parts: list[Part], names: tuple[str, ...], kinds: tuple[str, ...]) -> 
     starts = np.cumsum(counts) - counts
     index = np.array([names.index(part.name) for part in parts])
     group = np.where([kinds[i] == "skin" for i in index], -1, index)
-    normals = np.concatenate([np.full_like(part.positions, np.nan) if part.normals is None else part.normals for part in parts])
+    normals = np.concatenate(
+        [
+            np.full_like(part.positions, np.nan) if part.normals is None else part.normals
+            for part in parts
+        ]
+    )
     return _Mesh(
         positions=np.concatenate([part.positions for part in parts]),
-        faces=np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
+        faces=np.concatenate(
+            [part.faces + start for part, start in zip(parts, starts, strict=True)]
+        ),
         normals=np.where(np.abs(normals) < 1e30, normals, np.nan),
-        uvs=None if any(part.uvs is None for part in parts) else np.concatenate([part.uvs for part in parts]),
+        uvs=None
+        if any(part.uvs is None for part in parts)
+        else np.concatenate([part.uvs for part in parts]),
         part_of_face=np.repeat(index, [len(part.faces) for part in parts]),
         group=np.repeat(group, counts).astype(np.int32),
     )
@@ -201,12 +253,17 @@ def _check_finite(source: Source, part: Part) -> None:
     for what, values in (("positions", part.positions), ("texture coordinates", part.uvs)):
         if values is not None and not (usable := (np.abs(values) < 1e30).all(axis=1)).all():
             raise source.error(
-                f"the part {part.name!r} has {(~usable).sum()} {what} that are not finite or absurdly large, "
-                f"the first ({', '.join(f'{value:g}' for value in values[np.argmin(usable)])}); expected numbers"
+                f"the part {part.name!r} has {(~usable).sum()} {what} that are not finite or "
+                "absurdly large, "
+                "the first "
+                f"({', '.join(f'{value:g}' for value in values[np.argmin(usable)])}); "
+                "expected numbers"
             )
 
 
-def _upward(source: Source, extents: np.ndarray, given: str | None, of_format: bool) -> tuple[str, str]:
+def _upward(
+    source: Source, extents: np.ndarray, given: str | None, of_format: bool
+) -> tuple[str, str]:
     """Which axis is up, and how that is known."""
     if given:
         return given, "given"
@@ -215,32 +272,51 @@ def _upward(source: Source, extents: np.ndarray, given: str | None, of_format: b
     _, y, z = extents
     if z <= Z_UP_RATIO * y:
         return "y", "guessed"
-    source.note(f"z was taken as up, since the head is longer along z ({z:.4g}) than along y ({y:.4g}); say which is up if that is wrong")
+    source.note(
+        f"z was taken as up, since the head is longer along z ({z:.4g}) than along y "
+        f"({y:.4g}); say which is up if that is wrong"
+    )
     return "z", "guessed"
 
 
-def _unit(source: Source, extents: np.ndarray, given: str | None, of_format: bool) -> tuple[str, str]:
+def _unit(
+    source: Source, extents: np.ndarray, given: str | None, of_format: bool
+) -> tuple[str, str]:
     """The unit of the positions, and how that is known."""
     largest, slender = extents.max(), extents.min() < SLENDER * extents.max()
-    expected = f"expected {HEAD_MM[0] / 1000} to {HEAD_MM[1] / 1000} m, or up to {BODY_MM / 1000} m for a whole body"
+    expected = (
+        f"expected {HEAD_MM[0] / 1000} to {HEAD_MM[1] / 1000} m, or up to "
+        f"{BODY_MM / 1000} m for a whole body"
+    )
 
     def sized_like_somebody(unit: str) -> bool:
         return HEAD_MM[0] <= largest * UNITS_MM[unit] <= BODY_MM
 
     if given:
         if not sized_like_somebody(given):
-            raise source.error(f"is {largest * UNITS_MM[given] / 1000:.4g} m across if its unit is {given}; {expected}")
+            raise source.error(
+                f"is {largest * UNITS_MM[given] / 1000:.4g} m across if its unit is {given}; "
+                f"{expected}"
+            )
         return given, "given"
     if of_format and sized_like_somebody("m"):
         return "m", "format"
-    likely = (unit for unit in UNITS_MM if sized_like_somebody(unit) and (slender or largest * UNITS_MM[unit] <= HEAD_MM[1]))
+    likely = (
+        unit
+        for unit in UNITS_MM
+        if sized_like_somebody(unit) and (slender or largest * UNITS_MM[unit] <= HEAD_MM[1])
+    )
     unit = next(likely, None)
     if unit is None:
         raise source.error(
-            f"is {largest:.4g} units across, which is no head in {', '.join(UNITS_MM)} ({expected}); give its unit, or scale it first"
+            f"is {largest:.4g} units across, which is no head in {', '.join(UNITS_MM)} "
+            f"({expected}); give its unit, or scale it first"
         )
     size = f"{largest * UNITS_MM[unit] / 10:.4g} cm across"
-    source.note(f"the unit was taken as {unit}, which makes the head {size}; say which it is if that is wrong")
+    source.note(
+        f"the unit was taken as {unit}, which makes the head {size}; say which it is if that "
+        "is wrong"
+    )
     return unit, "guessed"
 
 
@@ -254,7 +330,11 @@ def _drop_faces_without_use(source: Source, mesh: _Mesh) -> None:
     if not whole.all():
         source.note(f"{(~whole).sum()} of its {len(whole)} faces have no area and were left out")
     order = np.lexsort((c, b, a))  # stable: the first of equals stays
-    same = (a[order][1:] == a[order][:-1]) & (b[order][1:] == b[order][:-1]) & (c[order][1:] == c[order][:-1])
+    same = (
+        (a[order][1:] == a[order][:-1])
+        & (b[order][1:] == b[order][:-1])
+        & (c[order][1:] == c[order][:-1])
+    )
     double = np.zeros(len(whole), bool)
     double[order[1:][same]] = True
     double &= whole
@@ -271,28 +351,42 @@ def _check_surface(source: Source, mesh: _Mesh, kinds: tuple[str, ...]) -> None:
     begin, end = welded.reshape(-1), np.roll(welded, -1, axis=1).reshape(-1)
     count = len(mesh.positions)
     keys, first, edge, uses = np.unique(
-        np.minimum(begin, end) * count + np.maximum(begin, end), return_index=True, return_inverse=True, return_counts=True
+        np.minimum(begin, end) * count + np.maximum(begin, end),
+        return_index=True,
+        return_inverse=True,
+        return_counts=True,
     )
 
     def judge(bad: np.ndarray, what: str, refuse: bool) -> None:
         if not bad.any():
             return
         corner = first[np.argmax(bad)]
-        ends = mesh.positions[[faces.flat[corner], faces.flat[corner - corner % 3 + (corner + 1) % 3]]]
+        ends = mesh.positions[
+            [faces.flat[corner], faces.flat[corner - corner % 3 + (corner + 1) % 3]]
+        ]
         places = " and ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in ends)
         found = f"{bad.sum()} of its {len(keys)} edges {what}, one of them between {places} mm"
         if refuse and bad.sum() > NON_MANIFOLD_LIMIT * len(keys):
-            raise source.error(f"is not a manifold surface: {found}; expected at most {NON_MANIFOLD_LIMIT:.2%}, mend it first")
+            raise source.error(
+                f"is not a manifold surface: {found}; expected at most "
+                f"{NON_MANIFOLD_LIMIT:.2%}, mend it first"
+            )
         source.note(found)
 
     judge(uses > 2, "have more than two faces", refuse=True)
     forward = np.bincount(edge, weights=begin < end, minlength=len(keys))
     without_normals = not np.isfinite(mesh.normals[faces]).all()
-    judge((uses == 2) & (forward != 1), "have two faces that disagree about which side is out", refuse=without_normals)
+    judge(
+        (uses == 2) & (forward != 1),
+        "have two faces that disagree about which side is out",
+        refuse=without_normals,
+    )
 
 
 def _turn_outside_out(source: Source, mesh: _Mesh) -> None:
-    """Turn all faces round when they wind against the given normals or, without these, when they enclose a negative volume."""
+    """Turn all faces round when they wind against the given normals or, without these, when they
+    enclose a negative volume.
+    """
     area, corners = mesh.area_vectors(), mesh.positions[mesh.faces]
     given = mesh.normals[mesh.faces].sum(axis=1)
     if (known := np.isfinite(given).all(axis=1)).any():
@@ -307,13 +401,19 @@ def _turn_outside_out(source: Source, mesh: _Mesh) -> None:
 
 
 def _complete_normals(mesh: _Mesh) -> None:
-    """Unit normals: the given ones, and area-weighted over all faces at a point where there is none (or none of any length)."""
+    """Unit normals: the given ones, and area-weighted over all faces at a point where there is none
+    (or none of any length).
+    """
     area, points = mesh.area_vectors(), mesh.points[mesh.faces.reshape(-1)]
-    sums = np.stack([np.bincount(points, weights=np.repeat(area[:, axis], 3)) for axis in range(3)], axis=1)
+    sums = np.stack(
+        [np.bincount(points, weights=np.repeat(area[:, axis], 3)) for axis in range(3)], axis=1
+    )
     smooth = np.empty(mesh.normals.shape)
     smooth[mesh.faces.reshape(-1)] = sums[points]
     # Where the faces at a point cancel out, take one of them.
-    flat = np.linalg.norm(smooth[mesh.faces], axis=2) <= 1e-9 * np.linalg.norm(area, axis=1)[:, None]
+    flat = (
+        np.linalg.norm(smooth[mesh.faces], axis=2) <= 1e-9 * np.linalg.norm(area, axis=1)[:, None]
+    )
     smooth[mesh.faces[flat]] = np.broadcast_to(area[:, None], (*flat.shape, 3))[flat]
     length = np.linalg.norm(mesh.normals, axis=1)
     mesh.normals = np.where((np.isfinite(length) & (length > 1e-6))[:, None], mesh.normals, smooth)

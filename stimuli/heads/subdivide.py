@@ -26,7 +26,9 @@ def _children(quads: np.ndarray, of_side: np.ndarray, vertices: int, edges: int)
     return np.stack(child, axis=1).reshape(-1, 4)
 
 
-def _incidence(rows: np.ndarray, columns: np.ndarray, value: float, shape: tuple[int, int]) -> sparse.csr_matrix:
+def _incidence(
+    rows: np.ndarray, columns: np.ndarray, value: float, shape: tuple[int, int]
+) -> sparse.csr_matrix:
     """Sparse matrix with `value` at each (row, column)."""
     return sparse.csr_matrix((np.full(rows.size, value), (rows.ravel(), columns.ravel())), shape)
 
@@ -63,22 +65,30 @@ def catmull_clark(quads: np.ndarray, vertices: int) -> tuple[sparse.csr_matrix, 
     on_border = np.asarray((edge_at @ border).sum(axis=1)).ravel() > 0
     used = n_faces > 0
     n = np.where(used, n_faces, 1)
-    smooth = (sparse.diags(1 / n**2) @ at_vertex @ face
-              + sparse.diags(2 / (n * np.where(used, n_edges, 1))) @ edge_at @ mid
-              + sparse.diags((n - 3) / n))
+    smooth = (
+        sparse.diags(1 / n**2) @ at_vertex @ face
+        + sparse.diags(2 / (n * np.where(used, n_edges, 1))) @ edge_at @ mid
+        + sparse.diags((n - 3) / n)
+    )
     border_edges = edge_at @ border
     n_border = np.where(on_border, np.asarray(border_edges.sum(axis=1)).ravel(), 1)
     curve = 0.5 * sparse.identity(vertices) + sparse.diags(0.5 / n_border) @ border_edges @ mid
-    vertex_point = (sparse.diags((used & ~on_border).astype(float)) @ smooth
-                    + sparse.diags((used & on_border).astype(float)) @ curve
-                    + sparse.diags((~used).astype(float)))
-    return sparse.vstack([vertex_point, edge_point, face]).tocsr(), _children(quads, of_side, vertices, n_e)
+    vertex_point = (
+        sparse.diags((used & ~on_border).astype(float)) @ smooth
+        + sparse.diags((used & on_border).astype(float)) @ curve
+        + sparse.diags((~used).astype(float))
+    )
+    return sparse.vstack([vertex_point, edge_point, face]).tocsr(), _children(
+        quads, of_side, vertices, n_e
+    )
 
 
 def bilinear(quads: np.ndarray, vertices: int) -> tuple[sparse.csr_matrix, np.ndarray]:
     """One level that keeps the old points (texture coordinates): edge and face points are means."""
     edges, of_side, _, _, face, mid = _points(quads, vertices)
-    return sparse.vstack([sparse.identity(vertices), mid, face]).tocsr(), _children(quads, of_side, vertices, len(edges))
+    return sparse.vstack([sparse.identity(vertices), mid, face]).tocsr(), _children(
+        quads, of_side, vertices, len(edges)
+    )
 
 
 def triangles(quads: np.ndarray) -> np.ndarray:
@@ -90,5 +100,8 @@ def vertex_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Area-weighted unit vertex normals (N, 3) of triangles (M, 3)."""
     a, b, c = (positions[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
-    total = np.stack([np.bincount(faces.ravel(), np.repeat(normal[:, k], 3), len(positions)) for k in range(3)], axis=1)
+    total = np.stack(
+        [np.bincount(faces.ravel(), np.repeat(normal[:, k], 3), len(positions)) for k in range(3)],
+        axis=1,
+    )
     return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-20)

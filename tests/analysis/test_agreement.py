@@ -1,4 +1,6 @@
-"""Agreement against published examples, evalica and counting by hand; exclusions; what changes nothing and what has no number."""
+"""Agreement against published examples, evalica and counting by hand; exclusions; what changes
+nothing and what has no number.
+"""
 
 from dataclasses import replace
 from itertools import combinations, product
@@ -25,8 +27,12 @@ from analysis.options import Exclusions, Options
 from analysis.panel import MISSING, panels
 
 FAST = Options(resamples=200, models=("bradley_terry",))
-#: Krippendorff 2011, "Computing Krippendorff's Alpha-Reliability", example C: 4 observers, 12 units, values 1 to 5.
-OBSERVERS = """1 2 3 3 2 1 4 1 2 . . . | 1 2 3 3 2 2 4 1 2 5 . 3 | . 3 3 3 2 3 4 2 2 5 1 . | 1 2 3 3 2 4 4 1 2 5 1 ."""
+#: Krippendorff 2011, "Computing Krippendorff's Alpha-Reliability", example C: 4 observers, 12
+#: units, values 1 to 5.
+OBSERVERS = (
+    "1 2 3 3 2 1 4 1 2 . . . | 1 2 3 3 2 2 4 1 2 5 . 3 | "
+    ". 3 3 3 2 3 4 2 2 5 1 . | 1 2 3 3 2 4 4 1 2 5 1 ."
+)
 
 
 def counted(ratings):
@@ -38,12 +44,15 @@ def values(found, framing="close-up"):
     return found[found.framing == framing].set_index("statistic")
 
 
-# --- alpha, u, triads --------------------------------------------------------------------------------------------------------------
+# --- alpha, u, triads
+# -----------------------------------------------------------------------------
 
 
 def test_alpha_of_krippendorffs_example():
     """He prints 0.815 for ordinal data."""
-    ratings = np.array([[float(cell.replace(".", "nan")) for cell in row.split()] for row in OBSERVERS.split("|")])
+    ratings = np.array(
+        [[float(cell.replace(".", "nan")) for cell in row.split()] for row in OBSERVERS.split("|")]
+    )
     assert krippendorff_alpha(counted(ratings)) == pytest.approx(0.815, abs=5e-4)
 
 
@@ -66,7 +75,8 @@ def test_alpha_of_perfect_agreement_and_of_none():
 
 
 def split(target, pairs, m):
-    """How often each of `pairs` pairs prefers the first of m (odd) times, so that the agreements add up to target.
+    """How often each of `pairs` pairs prefers the first of m (odd) times, so that the agreements
+    add up to target.
 
     With (m - 1)/2 - k against (m + 1)/2 + k a pair has its fewest agreements and k (k + 1) more.
     """
@@ -79,14 +89,18 @@ def split(target, pairs, m):
 
 
 def test_kendalls_u_of_the_school_subjects():
-    """Kendall and Babington Smith 1940: 25 girls, 11 subjects. R's eba prints u 0.08218 and, taking 1 from the agreements before,
-    chi-square 180.12 with 62.38 degrees of freedom; those belong to 8928 agreements."""
+    """Kendall and Babington Smith 1940: 25 girls, 11 subjects. R's eba prints u 0.08218 and, taking
+    1 from the agreements before, chi-square 180.12 with 62.38 degrees of freedom; those belong to
+    8928 agreements.
+    """
     first = split(8928, 55, 25)
     counts = np.zeros((55, 5))
     counts[:, 1], counts[:, 3] = first, 25 - first
     assert kendall_u(counts) == pytest.approx(0.08218, abs=5e-6)
     chi2, df, p = kendall_test(counts, 11)
-    assert df == pytest.approx(62.38, abs=0.005) and chi2 - 4 / (25 - 2) == pytest.approx(180.12, abs=0.005)
+    assert df == pytest.approx(62.38, abs=0.005) and chi2 - 4 / (25 - 2) == pytest.approx(
+        180.12, abs=0.005
+    )
     assert p == pytest.approx(stats.chi2.sf(chi2, df)) and p < 1e-12
 
 
@@ -108,7 +122,9 @@ def test_u_counts_the_people_who_agree(seed, crowd):
 
 
 def test_coins_are_those_of_every_throw(crowd, table):
-    """The exact null of 3 people and 3 pairs: all agree on all pairs with a chance of 1/64, on two of three with 9/64."""
+    """The exact null of 3 people and 3 pairs: all agree on all pairs with a chance of 1/64, on two
+    of three with 9/64.
+    """
     options = replace(FAST, resamples=20_000)
     for flips, chance in ((0, 1 / 64), (1, 10 / 64)):
         panel = crowd(3, [0, 0, 0], seed=1)
@@ -119,7 +135,9 @@ def test_coins_are_those_of_every_throw(crowd, table):
 
 
 def brute_force(sign, n):
-    """Circles counted from the wins of each item: Kendall's n (n - 1) (2n - 1)/12 - sum a^2/2, without ties."""
+    """Circles counted from the wins of each item: Kendall's n (n - 1) (2n - 1)/12 - sum a^2/2,
+    without ties.
+    """
     wins = np.zeros(n)
     for (i, j), value in zip(combinations(range(n), 2), sign, strict=True):
         wins[i if value < 0 else j] += 1
@@ -131,7 +149,9 @@ def test_circles_are_those_of_kendalls_formula(n, crowd):
     panel = crowd(40, np.zeros(n), seed=n, cuts=(0, 1))
     circular, decided, guessed = triads(panel)
     assert circular == pytest.approx([brute_force(one, n) for one in panel.preference])
-    assert (decided == len(list(combinations(range(n), 3)))).all() and guessed == pytest.approx(circular)
+    assert (decided == len(list(combinations(range(n), 3)))).all() and guessed == pytest.approx(
+        circular
+    )
     assert zeta(circular, n).min() >= 0 and zeta(0, n) == 1
 
 
@@ -162,19 +182,27 @@ def test_fewer_circles_than_guessing_has_the_moments_of_moran(crowd):
     assert circular.var() == pytest.approx(3 / 16 * decided.mean(), rel=0.08)
 
 
-# --- the table ---------------------------------------------------------------------------------------------------------------------
+# --- the table
+# -----------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def study(crowd):
-    return [crowd(20, [-0.8, 0, 0.3, 0.8], seed=seed, framing=name, side=0.9) for seed, name in enumerate(("close-up", "head-shot"))]
+    return [
+        crowd(20, [-0.8, 0, 0.3, 0.8], seed=seed, framing=name, side=0.9)
+        for seed, name in enumerate(("close-up", "head-shot"))
+    ]
 
 
 def test_agreement_has_its_columns_and_every_statistic_for_every_framing(study, table):
     found = agreement(table(*study), replace(FAST, models=("ordinal",)))
     assert list(found.columns) == ["framing", "statistic", "value", "low", "high", "p"]
     names = found.groupby("framing").statistic.apply(set)
-    assert names["close-up"] == names["head-shot"] == names["overall"] | {"pooled_circular_triads", "pooled_zeta"}
+    assert (
+        names["close-up"]
+        == names["head-shot"]
+        == names["overall"] | {"pooled_circular_triads", "pooled_zeta"}
+    )
     inside = found.dropna(subset=["low"])
     assert len(inside) > 20 and ((inside.low <= inside.value) & (inside.value <= inside.high)).all()
     assert found.p.dropna().between(0, 1).all()
@@ -184,31 +212,54 @@ def test_sides_of_people_who_lean(study, table):
     found = values(agreement(table(*study), replace(FAST, models=("ordinal",))), "overall")
     responses = table(*study).frame
     decided = responses.answer[responses.answer != 0]
-    assert found.value["left_share"] == pytest.approx((decided < 0).mean()) and found.p["left_share"] < 0.05
+    assert (
+        found.value["left_share"] == pytest.approx((decided < 0).mean())
+        and found.p["left_share"] < 0.05
+    )
     assert found.value["mean_answer"] == pytest.approx(responses.answer.mean())
-    assert found.value["side_effect"] == pytest.approx(0.9, abs=0.4) and found.p["side_effect"] < 0.05
+    assert (
+        found.value["side_effect"] == pytest.approx(0.9, abs=0.4) and found.p["side_effect"] < 0.05
+    )
 
 
 def test_times_are_medians_of_medians(study, table):
     responses = table(*study)
     found = values(agreement(responses, FAST), "overall").value
     frame = responses.frame
-    assert found["median_rt_ms"] == frame.groupby("participant", observed=True).rt_ms.median().median()
+    assert (
+        found["median_rt_ms"] == frame.groupby("participant", observed=True).rt_ms.median().median()
+    )
     none = frame[frame.strength == 0].groupby("participant", observed=True).rt_ms.median().median()
     assert found["median_rt_ms_none"] == none
 
 
 def test_other_sides_orders_and_twice_the_people(study, table):
     close = study[0]
-    kept = ["circular_triads", "zeta", "zeta_guessed", "pooled_zeta", "kendall_u", "krippendorff_alpha_both_ways"]
+    kept = [
+        "circular_triads",
+        "zeta",
+        "zeta_guessed",
+        "pooled_zeta",
+        "kendall_u",
+        "krippendorff_alpha_both_ways",
+    ]
     one = values(agreement(table(close, order="abcd"), FAST))
-    side = values(agreement(table(replace(close, first_left=~close.first_left), order="abcd"), FAST))
-    assert side.loc[[*kept, "krippendorff_alpha"], "value"].equals(one.loc[[*kept, "krippendorff_alpha"], "value"])
+    side = values(
+        agreement(table(replace(close, first_left=~close.first_left), order="abcd"), FAST)
+    )
+    assert side.loc[[*kept, "krippendorff_alpha"], "value"].equals(
+        one.loc[[*kept, "krippendorff_alpha"], "value"]
+    )
     assert side.value["mean_answer"] == pytest.approx(-one.value["mean_answer"])
     other = values(agreement(table(close, order="cadb"), FAST))
     assert other.value[kept].to_numpy() == pytest.approx(one.value[kept].to_numpy())
-    assert other.value["krippendorff_alpha"] != pytest.approx(one.value["krippendorff_alpha"], abs=1e-6)
-    twice = replace(close.chosen(np.tile(np.arange(20), 2)), participants=np.array([f"P{k:04d}" for k in range(40)], object))
+    assert other.value["krippendorff_alpha"] != pytest.approx(
+        one.value["krippendorff_alpha"], abs=1e-6
+    )
+    twice = replace(
+        close.chosen(np.tile(np.arange(20), 2)),
+        participants=np.array([f"P{k:04d}" for k in range(40)], object),
+    )
     double = values(agreement(table(twice, order="abcd"), FAST))
     for name in ("circular_triads", "zeta"):
         assert double.value[name] == pytest.approx(one.value[name])
@@ -216,21 +267,27 @@ def test_other_sides_orders_and_twice_the_people(study, table):
 
 
 def test_u_and_alpha_hold_their_truth_as_often_as_claimed(crowd):
-    """The truth from 20,000 people; of 100 studies of 25 people 95 % intervals hold it in 88 or more (binomial: fewer 1 %)."""
+    """The truth from 20,000 people; of 100 studies of 25 people 95 % intervals hold it in 88 or
+    more (binomial: fewer 1 %).
+    """
     from analysis.agreement import _concordance
 
     worth, hits = [-0.8, 0, 0.3, 0.8], np.zeros(2)
     truth = crowd(20_000, worth, seed=99)
     truth = np.array([kendall_u(truth.counts), krippendorff_alpha(truth.counts)])
     for seed in range(100):
-        rows = _concordance("close-up", crowd(25, worth, seed=seed), replace(FAST, resamples=100), [])
+        rows = _concordance(
+            "close-up", crowd(25, worth, seed=seed), replace(FAST, resamples=100), []
+        )
         low, high = (np.array([rows[0][at], rows[2][at]]) for at in (2, 3))
         hits += (low <= truth) & (truth <= high)
     assert (hits >= 88).all()
 
 
 def test_questions_asked_again(write):
-    """P1 is asked twice three times: same, opposite, same direction but stronger; P2 once, without a preference then."""
+    """P1 is asked twice three times: same, opposite, same direction but stronger; P2 once, without
+    a preference then.
+    """
     rows = [
         f"{person},3,close-up,{left},{right},{value},{order},1500,2024-05-01T09:00:00Z"
         for person, left, right, value, order in (
@@ -248,11 +305,20 @@ def test_questions_asked_again(write):
     ]
     responses = read_responses(write(rows), order="abc")
     assert len(responses.frame) == 5 and len(responses.findings) == 5
-    assert responses.repeats[["preference", "first_preference"]].to_numpy().tolist() == [[1, 1], [-1, 1], [-2, -1], [0, 1]]
+    assert responses.repeats[["preference", "first_preference"]].to_numpy().tolist() == [
+        [1, 1],
+        [-1, 1],
+        [-2, -1],
+        [0, 1],
+    ]
     found = values(agreement(responses, FAST)).value
-    assert found["repeat_share"] == pytest.approx(2 / 3) and found["repeat_same_answer"] == pytest.approx(1 / 4)
+    assert found["repeat_share"] == pytest.approx(2 / 3) and found[
+        "repeat_same_answer"
+    ] == pytest.approx(1 / 4)
     people = participants(responses, FAST).set_index("participant")
-    assert people.repeats.to_dict() == {"P1": 3, "P2": 1} and people.repeat_share["P1"] == pytest.approx(2 / 3)
+    assert people.repeats.to_dict() == {"P1": 3, "P2": 1} and people.repeat_share[
+        "P1"
+    ] == pytest.approx(2 / 3)
     assert np.isnan(people.repeat_share["P2"])
 
 
@@ -260,33 +326,47 @@ def test_nothing_asked_again_and_one_participant_are_said(lines):
     found = agreement(lines("a>b b>c a>c"), FAST)
     notes = " ".join(found.attrs["notes"])
     assert "no question was asked again" in notes and "one participant: no agreement" in notes
-    assert values(found).loc[["kendall_u", "krippendorff_alpha", "repeat_share"], "value"].isna().all()
+    assert (
+        values(found).loc[["kendall_u", "krippendorff_alpha", "repeat_share"], "value"].isna().all()
+    )
     assert values(found).value["zeta"] == 1 and found[["low", "high"]].isna().all(axis=None)
 
 
 def test_two_techniques_and_incomplete_answers_have_no_circles(lines):
-    assert any("fewer than three techniques" in note for note in agreement(lines(*["a>b"] * 6), FAST).attrs["notes"])
+    assert any(
+        "fewer than three techniques" in note
+        for note in agreement(lines(*["a>b"] * 6), FAST).attrs["notes"]
+    )
     found = agreement(lines(*["a>b b>c"] * 6), FAST)
     assert any("nobody answered every pair" in note for note in found.attrs["notes"])
     assert np.isnan(values(found).value["zeta"]) and np.isnan(values(found).value["pooled_zeta"])
 
 
-# --- participants and exclusions ---------------------------------------------------------------------------------------------------
+# --- participants and exclusions
+# -----------------------------------------------------------------------------
 
 
 def test_participants_by_hand(lines):
     found = participants(lines("a>b b>>c a=c", "a>b b>c a>c", "a<b b<c a<c"), FAST)
     assert list(found.columns) == list(PARTICIPANTS)
     first = found.iloc[0]
-    assert first[["answers", "left", "none", "right", "circular_triads", "zeta", "repeats"]].tolist() == [3, 2, 1, 0, 0, 1, 0]
-    assert first.side_p == pytest.approx(0.5) and first.same_answer_share == pytest.approx(1 / 3) and first.median_rt_ms == 1500
+    assert first[
+        ["answers", "left", "none", "right", "circular_triads", "zeta", "repeats"]
+    ].tolist() == [3, 2, 1, 0, 0, 1, 0]
+    assert (
+        first.side_p == pytest.approx(0.5)
+        and first.same_answer_share == pytest.approx(1 / 3)
+        and first.median_rt_ms == 1500
+    )
     # the others cancel out in all three pairs
     assert np.isnan(first.agreement_with_others)
     assert found.agreement_with_others[2] == pytest.approx(-(2 + 3 + 1) / np.sqrt(3 * (4 + 9 + 1)))
 
 
 def faulty(study, table):
-    """20 people; P0000 always goes left, P0001 always says 'no difference', P0002 stops after two answers."""
+    """20 people; P0000 always goes left, P0001 always says 'no difference', P0002 stops after two
+    answers.
+    """
     spoilt = []
     for panel in study:
         preference = panel.preference.copy()
@@ -299,24 +379,44 @@ def faulty(study, table):
 
 def test_declared_exclusions_name_their_rule(study, table):
     found = participants(faulty(study, table), FAST).set_index("participant").excluded
-    assert found["P0000"] == "one_side_share; same_answer_share" and found["P0001"] == "same_answer_share" and found["P0002"] == "answered_share"
+    assert (
+        found["P0000"] == "one_side_share; same_answer_share"
+        and found["P0001"] == "same_answer_share"
+        and found["P0002"] == "answered_share"
+    )
     assert (found.iloc[3:] == "").all()
-    none = Exclusions(answered_share=None, one_side_share=None, median_rt_ms=None, same_answer_share=None)
+    none = Exclusions(
+        answered_share=None, one_side_share=None, median_rt_ms=None, same_answer_share=None
+    )
     assert (participants(faulty(study, table), replace(FAST, exclusions=none)).excluded == "").all()
-    slow = participants(faulty(study, table), replace(FAST, exclusions=replace(none, median_rt_ms=1e7)))
+    slow = participants(
+        faulty(study, table), replace(FAST, exclusions=replace(none, median_rt_ms=1e7))
+    )
     assert (slow.excluded == "median_rt_ms").all()
 
 
 def test_sensitivity_compares_with_and_without(study, table):
     responses = faulty(study, table)
     found = sensitivity(responses, FAST)
-    assert list(found.columns) == ["framing", "conclusion", "a", "b", "everyone", "without_excluded", "changed"]
+    assert list(found.columns) == [
+        "framing",
+        "conclusion",
+        "a",
+        "b",
+        "everyone",
+        "without_excluded",
+        "changed",
+    ]
     assert found.attrs["notes"][0].startswith("3 of 20 participants are excluded")
     assert set(found.conclusion) == {"preferred", "first"} and len(found) == 3 * (6 + 1)
-    assert (found.changed == (found.everyone != found.without_excluded)).all() and responses.participants == 20
+    assert (
+        found.changed == (found.everyone != found.without_excluded)
+    ).all() and responses.participants == 20
     alone = table(*(panel.chosen(np.arange(3, 20)) for panel in study), order="abcd")
     clean = sensitivity(alone, FAST)
-    assert (clean.everyone.to_numpy() == found.without_excluded.to_numpy()).all() and not clean.changed.any()
+    assert (
+        clean.everyone.to_numpy() == found.without_excluded.to_numpy()
+    ).all() and not clean.changed.any()
     everyone = sensitivity(responses, replace(FAST, exclusions=Exclusions(median_rt_ms=1e9)))
     assert everyone.empty and "nobody is left" in everyone.attrs["notes"][1]
     margin = sensitivity(responses, replace(FAST, margin=0.5))

@@ -1,4 +1,6 @@
-"""AHP against the numbers that Vuletic's thesis printed, against power iteration, and where it must refuse."""
+"""AHP against the numbers that Vuletic's thesis printed, against power iteration, and where it must
+refuse.
+"""
 
 from pathlib import Path
 
@@ -6,7 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import InputError, comparisons, medians, priorities, priorities_table, read_matrices, read_responses
+from analysis import (
+    InputError,
+    comparisons,
+    medians,
+    priorities,
+    priorities_table,
+    read_matrices,
+    read_responses,
+)
 from analysis.ahp import RANDOM_INDEX, judgements
 
 MATRICES = Path(__file__).parent / "thesis_matrices.toml"
@@ -32,13 +42,17 @@ def test_judgements_are_the_scale_of_the_thesis():
 
 
 def test_medians_are_taken_above_the_diagonal_and_inverted_below(write, answer):
-    """The trap: two people, one without a preference, one slightly for a; 1.5 over the diagonal, 1/1.5 under it, not 0.75."""
+    """The trap: two people, one without a preference, one slightly for a; 1.5 over the diagonal,
+    1/1.5 under it, not 0.75.
+    """
     path = write([answer("P1", "close-up", "a", "b", -1), answer("P2", "close-up", "a", "b", 0)])
     matrix = comparisons(read_responses(path, order=["a", "b"]))["close-up"].matrix
     assert matrix == pytest.approx(np.array([[1, 1.5], [1 / 1.5, 1]]))
     turned = comparisons(read_responses(path, order=["b", "a"]))["close-up"].matrix
     assert turned == pytest.approx(np.array([[1, 0.75], [1 / 0.75, 1]]))
-    assert medians(read_responses(path)).to_dict("split")["data"] == [["close-up", "a", "b", 2, -0.5, 1.5]]
+    assert medians(read_responses(path)).to_dict("split")["data"] == [
+        ["close-up", "a", "b", 2, -0.5, 1.5]
+    ]
 
 
 @pytest.mark.parametrize("n", range(3, 12))
@@ -50,7 +64,9 @@ def test_priorities_are_those_of_power_iteration(n):
     for _ in range(500):
         vector = matrix @ vector / (matrix @ vector).sum()
     found = priorities(matrix)
-    assert found.vector == pytest.approx(vector, abs=1e-10) and found.vector.sum() == pytest.approx(1)
+    assert found.vector == pytest.approx(vector, abs=1e-10) and found.vector.sum() == pytest.approx(
+        1
+    )
     assert found.lambda_max == pytest.approx((matrix @ vector).sum(), abs=1e-9)
     if n > 10:
         assert found.cr is None and "no random index beyond 10" in found.verdict
@@ -74,7 +90,11 @@ def test_one_and_two_items_are_always_coherent():
 def test_a_circle_is_incoherent():
     circle = np.array([[1, 3, 1 / 3], [1 / 3, 1, 3], [3, 1 / 3, 1]])
     found = priorities(circle)
-    assert found.vector == pytest.approx([1 / 3] * 3) and found.cr > 0.1 and found.verdict.startswith("incoherent")
+    assert (
+        found.vector == pytest.approx([1 / 3] * 3)
+        and found.cr > 0.1
+        and found.verdict.startswith("incoherent")
+    )
 
 
 def test_pairs_that_nobody_compared_are_named_and_give_no_priorities(write, answer):
@@ -96,7 +116,9 @@ def test_doubling_the_people_changes_no_median_and_no_priority(write, random_stu
     before, after = read_responses(write(rows)), read_responses(write(twice))
     columns = ["framing", "a", "b", "median_preference", "median_judgement"]
     pd.testing.assert_frame_equal(medians(before)[columns], medians(after)[columns])
-    pd.testing.assert_frame_equal(priorities_table(comparisons(before)), priorities_table(comparisons(after)))
+    pd.testing.assert_frame_equal(
+        priorities_table(comparisons(before)), priorities_table(comparisons(after))
+    )
 
 
 def test_with_an_odd_number_of_people_the_order_only_permutes(write, random_study):
@@ -104,7 +126,9 @@ def test_with_an_odd_number_of_people_the_order_only_permutes(write, random_stud
     names = read_responses(path).codebook.techniques
     keys = ["framing", "technique"]
     one, other = (
-        priorities_table(comparisons(read_responses(path, order=order))).sort_values(keys).reset_index(drop=True)
+        priorities_table(comparisons(read_responses(path, order=order)))
+        .sort_values(keys)
+        .reset_index(drop=True)
         for order in (names, names[::-1])
     )
     pd.testing.assert_frame_equal(one, other, rtol=1e-9)
@@ -122,14 +146,26 @@ def test_with_an_odd_number_of_people_the_order_only_permutes(write, random_stud
         ('items = ["a"]\n[matrix]', "matrix is {}"),
         ('items = ["a", "b"]\n[matrix.x]\nrow = 1', "matrix.x.rows is None, expected 2 rows"),
         ('items = ["a", "b"]\n[matrix.x]\nrows = [[1, 2]]', "matrix.x.rows is 1 rows"),
-        ('items = ["a", "b"]\n[matrix.x]\nrows = [[1, 2], [0.5]]', r"rows\[1\] has 1 numbers, expected 2"),
+        (
+            'items = ["a", "b"]\n[matrix.x]\nrows = [[1, 2], [0.5]]',
+            r"rows\[1\] has 1 numbers, expected 2",
+        ),
         ('items = ["a", "b"]\n[matrix.x]\nrows = [[1, 2], 3]', r"rows\[1\] has 3"),
         ('items = ["a", "b"]\n[matrix.x]\nrows = [[1, "2"], [0.5, 1]]', r"rows\[0\]\[1\] is '2'"),
-        ('items = ["a", "b"]\n[matrix.x]\nrows = [[1, -2], [-0.5, 1]]', r"rows\[0\]\[1\] is -2, expected a positive"),
+        (
+            'items = ["a", "b"]\n[matrix.x]\nrows = [[1, -2], [-0.5, 1]]',
+            r"rows\[0\]\[1\] is -2, expected a positive",
+        ),
         ('items = ["a", "b"]\n[matrix.x]\nrows = [[1, inf], [0, 1]]', r"rows\[0\]\[1\] is inf"),
         ('items = ["a", "b"]\n[matrix.x]\nrows = [[true, 1], [1, 1]]', r"rows\[0\]\[0\] is True"),
-        ('items = ["a", "b"]\n[matrix.x]\nrows = [[1, 2], [2, 1]]', "not reciprocal: a over b is 2 and the other way 2"),
-        ('items = ["a", "b"]\n[matrix.x]\nrows = [[2, 1], [1, 1]]', "not reciprocal: a over a is 2"),
+        (
+            'items = ["a", "b"]\n[matrix.x]\nrows = [[1, 2], [2, 1]]',
+            "not reciprocal: a over b is 2 and the other way 2",
+        ),
+        (
+            'items = ["a", "b"]\n[matrix.x]\nrows = [[2, 1], [1, 1]]',
+            "not reciprocal: a over a is 2",
+        ),
     ],
 )
 def test_broken_matrices_are_refused_in_one_line(tmp_path, text, expected):

@@ -1,4 +1,6 @@
-"""Tables that a method cannot answer for: the whole report is still made, and says in words what it cannot say in numbers."""
+"""Tables that a method cannot answer for: the whole report is still made, and says in words what it
+cannot say in numbers.
+"""
 
 import io
 import re
@@ -26,7 +28,9 @@ def worths(files):
 
 @pytest.fixture
 def report(undrawn, write, answer):
-    """report(people, names, give, pairs) -> files; give(rng, a, b) is the answer, negative for a."""
+    """report(people, names, give, pairs) -> files; give(rng, a, b) is the answer,
+    negative for a.
+    """
 
     def report(people, names, give, pairs=None, framings=("close-up",)):
         rng = np.random.default_rng(0)
@@ -36,7 +40,10 @@ def report(undrawn, write, answer):
             for framing in framings
             for a, b in (pairs or combinations(names, 2))
         ]
-        return report_responses(read_responses(write(rows), order=names), options=Options(margin=0.25, margin_jod=0.5, resamples=100))
+        return report_responses(
+            read_responses(write(rows), order=names),
+            options=Options(margin=0.25, margin_jod=0.5, resamples=100),
+        )
 
     return report
 
@@ -53,7 +60,9 @@ def test_one_participant_has_counts_and_no_tests(report):
 
 
 def test_fewer_people_than_a_test_needs(report):
-    assert "too few people answered to test any pair" in in_short(report(4, ["a", "b", "c"], any_answer))
+    assert "too few people answered to test any pair" in in_short(
+        report(4, ["a", "b", "c"], any_answer)
+    )
 
 
 def test_one_pair(report):
@@ -64,7 +73,10 @@ def test_one_pair(report):
 def test_only_ties_have_no_worths_and_no_winner(report):
     files = report(8, ["a", "b", "c"], lambda *_: 0)
     text = in_short(files)
-    assert "every answer is 'no difference'" in text and "preferred" not in text.split("What was counted")[0]
+    assert (
+        "every answer is 'no difference'" in text
+        and "preferred" not in text.split("What was counted")[0]
+    )
     assert worths(files).estimate.isna().all() and "figures/jod_ladder.svg" not in files
 
 
@@ -81,12 +93,17 @@ def test_an_unbeaten_technique_is_named_and_has_no_number(report):
 
 def test_groups_that_never_met_are_named(report):
     text = in_short(report(8, list("abcd"), any_answer, pairs=[("a", "b"), ("c", "d")]))
-    assert "were never compared, not even through others" in text and "No priorities: 4 pairs had no answer." in text
+    assert (
+        "were never compared, not even through others" in text
+        and "No priorities: 4 pairs had no answer." in text
+    )
 
 
 def test_eleven_techniques(report):
     text = in_short(report(6, [f"t{k}" for k in range(11)], any_answer))
-    assert "there is no random index beyond 10 items" in text and "all 55 pairs are undecided" in text
+    assert (
+        "there is no random index beyond 10 items" in text and "all 55 pairs are undecided" in text
+    )
 
 
 def test_everyone_excluded_leaves_nothing_to_conclude_again(report):
@@ -96,5 +113,7 @@ def test_everyone_excluded_leaves_nothing_to_conclude_again(report):
 def test_letters_without_a_glyph_are_said(write, answer):
     from analysis import figures
 
-    picture = figures._picture("x", "t", "c.", "a", lambda: figures.Figure(layout="constrained").text(0, 0, "日本").figure)
+    picture = figures._picture(
+        "x", "t", "c.", "a", lambda: figures.Figure(layout="constrained").text(0, 0, "日本").figure
+    )
     assert "Some letters of its names are not in the figure's font" in picture.caption

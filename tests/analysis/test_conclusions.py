@@ -1,4 +1,6 @@
-"""The sentences of the report, against hand-made tables: each number comes from its cell, and nothing more is claimed."""
+"""The sentences of the report, against hand-made tables: each number comes from its cell, and
+nothing more is claimed.
+"""
 
 import numpy as np
 import pandas as pd
@@ -10,13 +12,37 @@ from analysis.inference import PAIRS
 from analysis.options import Options
 from analysis.worth_figures import verdict
 
-BOOK = Codebook(("close-up",), ("a", "b", "c"), "", "", {("technique", "a"): "Ay", ("framing", "close-up"): "Close-up"})
-EQUAL = {"equivalent": 1.0, "tost_p": 0.001, "tost_holm_p": 0.01, "equivalence_low": -0.1, "equivalence_high": 0.12}
+BOOK = Codebook(
+    ("close-up",),
+    ("a", "b", "c"),
+    "",
+    "",
+    {("technique", "a"): "Ay", ("framing", "close-up"): "Close-up"},
+)
+EQUAL = {
+    "equivalent": 1.0,
+    "tost_p": 0.001,
+    "tost_holm_p": 0.01,
+    "equivalence_low": -0.1,
+    "equivalence_high": 0.12,
+}
 
 
 def pair(a, b, **changes):
-    row = dict.fromkeys(PAIRS, 0.0) | {"framing": "close-up", "a": a, "b": b, "n": 20, "mean_preference": 0.05}
-    row |= {"holm_p": 0.5, "tost_p": 0.4, "tost_holm_p": 0.9, "equivalent": 0.0, "jod_equivalent": np.nan}
+    row = dict.fromkeys(PAIRS, 0.0) | {
+        "framing": "close-up",
+        "a": a,
+        "b": b,
+        "n": 20,
+        "mean_preference": 0.05,
+    }
+    row |= {
+        "holm_p": 0.5,
+        "tost_p": 0.4,
+        "tost_holm_p": 0.9,
+        "equivalent": 0.0,
+        "jod_equivalent": np.nan,
+    }
     return row | changes
 
 
@@ -24,15 +50,20 @@ def tables(*pairs, **changes):
     found = {
         "pairs": pd.DataFrame(pairs, columns=[*PAIRS]),
         "trend": pd.DataFrame([], columns=["statistic", "value", "low", "high", "p"]),
-        "agreement": pd.DataFrame([], columns=["framing", "statistic", "value", "low", "high", "p"]),
-        "familiarity_interaction": pd.DataFrame([], columns=["framing", "technique", "slope", "holm_p", "detectable"]),
+        "agreement": pd.DataFrame(
+            [], columns=["framing", "statistic", "value", "low", "high", "p"]
+        ),
+        "familiarity_interaction": pd.DataFrame(
+            [], columns=["framing", "technique", "slope", "holm_p", "detectable"]
+        ),
         "participants": pd.DataFrame({"excluded": ["", ""]}),
         "sensitivity": pd.DataFrame({"changed": [0, 0]}),
     }
     return found | changes
 
 
-def said(found, options=Options(margin=0.25), notes=(), simulated=False, people=20):
+def said(found, options=None, notes=(), simulated=False, people=20):
+    options = options or Options(margin=0.25)
     result = conclude(found, {"worths": tuple(notes)}, BOOK, options, people, simulated)
     return " | ".join(result.can), " | ".join(result.cannot)
 
@@ -63,30 +94,51 @@ def test_differences_name_winner_loser_and_the_largest_p():
             pair("b", "c", mean_preference=0.3),
         )
     )
-    assert "Close-up: people preferred Ay over b and c (Wilcoxon's signed-rank test, p at most 0.031 after Holm's correction; 2 of 3 pairs)." in can
-    assert "Close-up: 1 of 3 pairs is undecided: neither a difference nor equality is shown for b and c." in cannot
+    assert (
+        "Close-up: people preferred Ay over b and c (Wilcoxon's signed-rank test, p at most "
+        "0.031 after Holm's correction; 2 of 3 pairs)."
+    ) in can
+    assert (
+        "Close-up: 1 of 3 pairs is undecided: neither a difference nor equality is shown for "
+        "b and c."
+    ) in cannot
     assert "as good as each other" not in can
 
 
 def test_a_preference_for_the_second_turns_the_sentence():
-    can, _ = said(tables(pair("a", "b", holm_p=0.0001, mean_preference=0.7)), Options(margin=0.25, test="sign"))
-    assert "people preferred b over Ay (sign test, p <0.001 after Holm's correction; 1 of 1 pairs)" in can
+    can, _ = said(
+        tables(pair("a", "b", holm_p=0.0001, mean_preference=0.7)),
+        Options(margin=0.25, test="sign"),
+    )
+    assert (
+        "people preferred b over Ay (sign test, p <0.001 after Holm's correction; 1 of 1 pairs)"
+        in can
+    )
 
 
 def test_equality_is_claimed_after_correction_only_and_with_its_interval():
     can, _ = said(tables(pair("a", "b", **EQUAL)))
     assert (
-        "Close-up: Ay and b are as good as each other within the declared margin of 0.25 points: the mean preference for b is +0.05, "
-        "interval \N{MINUS SIGN}0.10 to +0.12 (two one-sided tests, p = 0.010 after Holm's correction)." in can
+        "Close-up: Ay and b are as good as each other within the declared margin of 0.25 "
+        "points: the mean preference for b is +0.05, "
+        "interval \N{MINUS SIGN}0.10 to +0.12 (two one-sided tests, p = 0.010 after Holm's "
+        "correction)." in can
     )
     can, cannot = said(tables(pair("a", "b", **EQUAL | {"tost_holm_p": 0.3})))
-    assert "as good" not in can and "when taken alone (two one-sided tests, p = 0.001)" in cannot and "(p = 0.30)" in cannot
+    assert (
+        "as good" not in can
+        and "when taken alone (two one-sided tests, p = 0.001)" in cannot
+        and "(p = 0.30)" in cannot
+    )
 
 
 def test_without_a_margin_nothing_is_equal_and_that_is_said():
     can, cannot = said(tables(pair("a", "b", equivalent=np.nan)), Options())
     assert "as good" not in can
-    assert "No margin of equivalence was declared" in cannot and "which does not make them equal" in cannot
+    assert (
+        "No margin of equivalence was declared" in cannot
+        and "which does not make them equal" in cannot
+    )
 
 
 def test_too_few_people_are_not_called_undecided():
@@ -96,7 +148,10 @@ def test_too_few_people_are_not_called_undecided():
 
 @pytest.mark.parametrize(("p", "where"), [(0.01, 0), (0.2, 1), (np.nan, 1)])
 def test_the_trend_is_concluded_with_its_p_only(p, where):
-    trend = pd.DataFrame([("slope_strength", -0.3, -0.4, -0.2, p)], columns=["statistic", "value", "low", "high", "p"])
+    trend = pd.DataFrame(
+        [("slope_strength", -0.3, -0.4, -0.2, p)],
+        columns=["statistic", "value", "low", "high", "p"],
+    )
     both = said(tables(pair("a", "b"), trend=trend))
     words = "change by \N{MINUS SIGN}0.300 a framing"
     assert words in both[where] and words not in both[1 - where]
@@ -117,7 +172,12 @@ def test_familiarity_names_what_would_have_been_found():
     ("excluded", "changed", "where", "words"),
     [
         (["", ""], [0, 0], 0, "fire for none of 2 participants"),
-        (["x", ""], [0, 0], 0, "Without the 1 participant whom the rules exclude, 0 of 2 conclusions would change"),
+        (
+            ["x", ""],
+            [0, 0],
+            0,
+            "Without the 1 participant whom the rules exclude, 0 of 2 conclusions would change",
+        ),
         (["x", ""], [1, 0], 1, "1 of 2 conclusions would change; see the table"),
         (["x", "x"], [], 1, "those who are left are too few"),
     ],
@@ -132,12 +192,25 @@ def test_exclusions_say_what_hangs_on_them(excluded, changed, where, words):
 
 
 def test_fits_that_do_not_exist_are_named_once_with_labels():
-    notes = [f"close-up, {model}: no finite worths: a was never beaten by b" for model in ("bradley_terry", "thurstone_jod")]
-    _, cannot = said(tables(pair("a", "b")), notes=[*notes, "close-up, davidson: 3 resamples have no finite worths"])
-    assert "Close-up: there are no worths by Bradley and Terry's model and Thurstone's case V: Ay was never beaten by b." in cannot
+    notes = [
+        f"close-up, {model}: no finite worths: a was never beaten by b"
+        for model in ("bradley_terry", "thurstone_jod")
+    ]
+    _, cannot = said(
+        tables(pair("a", "b")),
+        notes=[*notes, "close-up, davidson: 3 resamples have no finite worths"],
+    )
+    assert (
+        "Close-up: there are no worths by Bradley and Terry's model and Thurstone's case V: "
+        "Ay was never beaten by b."
+    ) in cannot
     assert "Davidson" not in cannot
 
 
 def test_simulated_answers_say_nothing_of_people():
     can, cannot = said(tables(pair("a", "b", holm_p=0.001, mean_preference=-1)), simulated=True)
-    assert "simulated participants preferred" in can and "people" not in can and "since a program answered" in cannot
+    assert (
+        "simulated participants preferred" in can
+        and "people" not in can
+        and "since a program answered" in cannot
+    )

@@ -1,4 +1,6 @@
-"""Tests on participants against scipy, statsmodels and full enumeration; equivalence, trend and familiarity; what has no test."""
+"""Tests on participants against scipy, statsmodels and full enumeration; equivalence, trend and
+familiarity; what has no test.
+"""
 
 from dataclasses import replace
 from itertools import product
@@ -10,7 +12,17 @@ from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.weightstats import DescrStatsW
 
 from analysis import tallies
-from analysis.inference import PAIRS, equivalence, familiarity_interaction, holm, net_scores, pairs, sign_test, signed_rank, trend
+from analysis.inference import (
+    PAIRS,
+    equivalence,
+    familiarity_interaction,
+    holm,
+    net_scores,
+    pairs,
+    sign_test,
+    signed_rank,
+    trend,
+)
 from analysis.options import Options
 from analysis.panel import MISSING
 
@@ -23,11 +35,14 @@ def three(crowd):
     worth = np.array([-0.9, 0.0, 0.2, 0.8])
     return [
         crowd(20, worth * scale, seed=seed, framing=name, taste=0.3, cuts=(cut, 2 * cut))
-        for seed, (name, scale, cut) in enumerate((("close-up", 1.5, 0.6), ("head-shot", 1.0, 1.0), ("half-length", 0.3, 1.8)))
+        for seed, (name, scale, cut) in enumerate(
+            (("close-up", 1.5, 0.6), ("head-shot", 1.0, 1.0), ("half-length", 0.3, 1.8))
+        )
     ]
 
 
-# --- the tests themselves ----------------------------------------------------------------------------------------------------------
+# --- the tests themselves
+# -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -50,7 +65,9 @@ def test_signed_ranks_without_ties_are_scipys_exact_test():
 
 def test_signed_ranks_of_many_are_scipys_normal_approximation():
     values = np.random.default_rng(1).integers(-2, 3, 200)
-    expected = stats.wilcoxon(values, zero_method="wilcox", correction=False, method="asymptotic").pvalue
+    expected = stats.wilcoxon(
+        values, zero_method="wilcox", correction=False, method="asymptotic"
+    ).pvalue
     p, method, _ = signed_rank(values)
     assert p == pytest.approx(expected, rel=1e-9) and method == "normal"
 
@@ -70,7 +87,9 @@ def test_signs_are_scipys_binomial_test(seed):
 
 
 def test_wilcoxons_own_example():
-    """Darwin's plants, Fisher 1935, "The Design of Experiments": 15 differences; two-sided p 0.0413 by signed ranks, 0.0074 by signs."""
+    """Darwin's plants, Fisher 1935, "The Design of Experiments": 15 differences; two-sided p 0.0413
+    by signed ranks, 0.0074 by signs.
+    """
     darwin = [49, -67, 8, 16, 6, 23, 28, 41, 14, 29, 56, 24, 75, 60, -48]
     assert signed_rank(darwin)[0] == pytest.approx(0.0413, abs=5e-5)
     assert sign_test(darwin) == pytest.approx(0.0074, abs=5e-5)
@@ -86,7 +105,11 @@ def test_holm_is_that_of_statsmodels_and_passes_over_what_was_not_tested():
 def test_equivalence_is_the_tost_of_statsmodels():
     values = np.random.default_rng(4).integers(-2, 3, 40)
     assert equivalence(values, 0.5) == pytest.approx(DescrStatsW(values).ttost_mean(-0.5, 0.5)[0])
-    assert np.isnan(equivalence(values, None)) and np.isnan(equivalence(np.zeros(20), 0.5)) and np.isnan(equivalence(values[:4], 0.5))
+    assert (
+        np.isnan(equivalence(values, None))
+        and np.isnan(equivalence(np.zeros(20), 0.5))
+        and np.isnan(equivalence(values[:4], 0.5))
+    )
 
 
 def test_nothing_to_test():
@@ -101,16 +124,21 @@ def test_a_true_null_is_rejected_no_more_often_than_alpha():
     assert ((p < 0.05).mean(axis=0) < 0.075).all()  # 0.05 and 2.3 standard errors
 
 
-# --- pairs -------------------------------------------------------------------------------------------------------------------------
+# --- pairs
+# -----------------------------------------------------------------------------
 
 
 def test_pairs_by_hand(lines):
     responses = lines("a>>b", "a>b", "a>b", "a=b", "a<b", "a>>b")
     row = pairs(responses, FAST).iloc[0]
     assert list(pairs(responses, FAST).columns) == list(PAIRS)
-    assert row[["a", "b", "n", "strong_a", "slight_a", "none", "slight_b", "strong_b"]].tolist() == ["a", "b", 6, 2, 2, 1, 1, 0]
+    assert row[
+        ["a", "b", "n", "strong_a", "slight_a", "none", "slight_b", "strong_b"]
+    ].tolist() == ["a", "b", 6, 2, 2, 1, 1, 0]
     # ranks of 2 1 1 -1 2: 4.5 2 2 2 4.5; for b 2 of 15: sums of plus of at most 2 are 1 + 3 of 32
-    assert row.wilcoxon_p == pytest.approx(2 * 4 / 32) and row.rank_biserial == pytest.approx(2 * 2 / 15 - 1)
+    assert row.wilcoxon_p == pytest.approx(2 * 4 / 32) and row.rank_biserial == pytest.approx(
+        2 * 2 / 15 - 1
+    )
     assert row.sign_p == pytest.approx(2 * (1 + 5) / 32) and row.holm_p == row.wilcoxon_p
     assert row.mean_preference == pytest.approx(-5 / 6) and row.low <= -5 / 6 <= row.high
     assert np.isnan(row.tost_p) and np.isnan(row.equivalent)
@@ -122,31 +150,48 @@ def test_families(three, table):
     study, framing = (pairs(responses, replace(FAST, family=one)) for one in ("study", "framing"))
     assert len(study) == 4 * 6
     within = study.framing != "overall"
-    assert study.holm_p[within].to_numpy() == pytest.approx(multipletests(study.wilcoxon_p[within], method="holm")[1])
+    assert study.holm_p[within].to_numpy() == pytest.approx(
+        multipletests(study.wilcoxon_p[within], method="holm")[1]
+    )
     for _, rows in framing.groupby("framing"):
-        assert rows.holm_p.to_numpy() == pytest.approx(multipletests(rows.wilcoxon_p, method="holm")[1])
+        assert rows.holm_p.to_numpy() == pytest.approx(
+            multipletests(rows.wilcoxon_p, method="holm")[1]
+        )
     sign = pairs(responses, replace(FAST, test="sign"))
-    assert sign.holm_p[within].to_numpy() == pytest.approx(multipletests(sign.sign_p[within], method="holm")[1])
+    assert sign.holm_p[within].to_numpy() == pytest.approx(
+        multipletests(sign.sign_p[within], method="holm")[1]
+    )
 
 
 def test_overall_takes_the_mean_of_a_person_over_framings(three, table):
     found = pairs(table(*three, order="abcd"), FAST)
     overall = found[found.framing == "overall"].iloc[0]
     mine = np.mean([panel.preference[:, 0] for panel in three], axis=0)
-    assert overall.n == 20 and overall[["strong_a", "slight_a", "none", "slight_b", "strong_b"]].sum() == 60
-    assert overall.mean_preference == pytest.approx(mine.mean()) and overall.sign_p == pytest.approx(sign_test(mine))
+    assert (
+        overall.n == 20
+        and overall[["strong_a", "slight_a", "none", "slight_b", "strong_b"]].sum() == 60
+    )
+    assert overall.mean_preference == pytest.approx(
+        mine.mean()
+    ) and overall.sign_p == pytest.approx(sign_test(mine))
     assert overall.dz == pytest.approx(mine.mean() / mine.std(ddof=1))
 
 
 def test_equivalent_needs_test_and_interval_within_the_margin(crowd, table):
     panel = crowd(80, [0, 0, 2], seed=1)
-    found = pairs(table(panel, order="abc"), replace(FAST, margin=0.5, margin_jod=0.7)).set_index(["a", "b"])
+    found = pairs(table(panel, order="abc"), replace(FAST, margin=0.5, margin_jod=0.7)).set_index(
+        ["a", "b"]
+    )
     assert found.equivalent.to_dict() == {("a", "b"): 1, ("a", "c"): 0, ("b", "c"): 0}
     same = found.loc[("a", "b")]
     assert same.tost_p < 0.05 and -0.5 < same.equivalence_low < same.equivalence_high < 0.5
     assert same.low < same.equivalence_low and same.equivalence_high < same.high  # 95 % about 90 %
     assert same.jod_equivalent == 1 and found.jod_equivalent[("a", "c")] == 0
-    strict = pairs(table(panel, order="abc"), replace(FAST, margin=0.01)).set_index(["a", "b"]).loc[("a", "b")]
+    strict = (
+        pairs(table(panel, order="abc"), replace(FAST, margin=0.01))
+        .set_index(["a", "b"])
+        .loc[("a", "b")]
+    )
     assert strict.equivalent == 0 and np.isnan(strict.jod_equivalent)
 
 
@@ -156,13 +201,23 @@ def test_other_sides_orders_and_twice_the_people(three, table):
     one = pairs(table(close, order="abcd"), options)
     side = pairs(table(replace(close, first_left=~close.first_left), order="abcd"), options)
     assert side.equals(one)
-    turned = pairs(table(close, order="dcba"), options).set_index(["b", "a"]).reindex(list(zip(one.a, one.b, strict=True)))
+    turned = (
+        pairs(table(close, order="dcba"), options)
+        .set_index(["b", "a"])
+        .reindex(list(zip(one.a, one.b, strict=True)))
+    )
     for column in ("wilcoxon_p", "sign_p", "holm_p", "tost_p"):
         assert turned[column].to_numpy() == pytest.approx(one[column].to_numpy())
     for column in ("mean_preference", "rank_biserial", "dz", "jod"):
         assert turned[column].to_numpy() == pytest.approx(-one[column].to_numpy())
-    assert turned.low.to_numpy() == pytest.approx(-one.high.to_numpy()) and (turned.strong_a.to_numpy() == one.strong_b).all()
-    twice = replace(close.chosen(np.tile(np.arange(20), 2)), participants=np.array([f"P{k:04d}" for k in range(40)], object))
+    assert (
+        turned.low.to_numpy() == pytest.approx(-one.high.to_numpy())
+        and (turned.strong_a.to_numpy() == one.strong_b).all()
+    )
+    twice = replace(
+        close.chosen(np.tile(np.arange(20), 2)),
+        participants=np.array([f"P{k:04d}" for k in range(40)], object),
+    )
     double = pairs(table(twice, order="abcd"), options)
     assert double.mean_preference.to_numpy() == pytest.approx(one.mean_preference.to_numpy())
     assert double.jod.to_numpy() == pytest.approx(one.jod.to_numpy())
@@ -171,8 +226,14 @@ def test_other_sides_orders_and_twice_the_people(three, table):
 
 def test_few_people_and_missing_answers(crowd, table):
     found = pairs(table(crowd(4, [0, 1, 2], seed=1)), replace(FAST, margin=0.5))
-    assert found[["wilcoxon_p", "sign_p", "holm_p", "tost_p", "low", "high", "equivalent"]].isna().all(axis=None)
-    assert found.mean_preference.notna().all() and any("4 participants, no test" in note for note in found.attrs["notes"])
+    assert (
+        found[["wilcoxon_p", "sign_p", "holm_p", "tost_p", "low", "high", "equivalent"]]
+        .isna()
+        .all(axis=None)
+    )
+    assert found.mean_preference.notna().all() and any(
+        "4 participants, no test" in note for note in found.attrs["notes"]
+    )
     panel = crowd(20, [0, 1, 2], seed=1)
     holes = panel.preference.copy()
     holes[:16, 0] = MISSING
@@ -184,20 +245,32 @@ def test_few_people_and_missing_answers(crowd, table):
 
 def test_all_alike_has_no_tost(lines):
     found = pairs(lines(*["a=b"] * 8), replace(FAST, margin=0.5)).iloc[0]
-    assert np.isnan(found.tost_p) and found.equivalent == 0 and found.wilcoxon_p == 1 and found.mean_preference == 0
+    assert (
+        np.isnan(found.tost_p)
+        and found.equivalent == 0
+        and found.wilcoxon_p == 1
+        and found.mean_preference == 0
+    )
 
 
-# --- trend and familiarity ---------------------------------------------------------------------------------------------------------
+# --- trend and familiarity
+# -----------------------------------------------------------------------------
 
 
 def test_the_trend_has_the_slope_of_the_tallies_and_scipys_page(three, table):
     responses = table(*three)
     found = trend(responses, FAST).set_index("statistic")
-    assert found.value["slope_total"] == pytest.approx(tallies.trend(tallies.totals(responses)).slope)
+    assert found.value["slope_total"] == pytest.approx(
+        tallies.trend(tallies.totals(responses)).slope
+    )
     strength = np.array([np.abs(panel.preference).mean(axis=1) for panel in three]).T
     slopes = [np.polyfit([1, 2, 3], one, 1)[0] for one in strength]
-    assert found.value["slope_strength"] == pytest.approx(np.mean(slopes)) and found.p["slope_strength"] == pytest.approx(signed_rank(slopes)[0])
-    assert found.value["page_l"] == pytest.approx(stats.page_trend_test(-strength, method="asymptotic").statistic)
+    assert found.value["slope_strength"] == pytest.approx(np.mean(slopes)) and found.p[
+        "slope_strength"
+    ] == pytest.approx(signed_rank(slopes)[0])
+    assert found.value["page_l"] == pytest.approx(
+        stats.page_trend_test(-strength, method="asymptotic").statistic
+    )
     assert found.p["page_l"] < 1e-4 and found.high["slope_total"] < 0
 
 
@@ -212,27 +285,44 @@ def test_familiarity_that_changes_preference_is_found(crowd, table):
     moved = panel.preference.copy()
     for person, name in enumerate(panel.participants):
         moved[person, 0] = np.clip(3 - level[name], -2, 2)  # novices prefer b, experts a
-    found = familiarity_interaction(table(replace(panel, preference=moved), familiarity=level, order="abc"), replace(FAST, resamples=999))
+    found = familiarity_interaction(
+        table(replace(panel, preference=moved), familiarity=level, order="abc"),
+        replace(FAST, resamples=999),
+    )
     found = found.set_index("technique")
-    assert found.p[""] < 0.01 and found.p["a"] < 0.01 and found.p["b"] < 0.01 and found.p["c"] > 0.01
+    assert (
+        found.p[""] < 0.01 and found.p["a"] < 0.01 and found.p["b"] < 0.01 and found.p["c"] > 0.01
+    )
     assert found.spearman["a"] > 0.4 > -0.4 > found.spearman["b"] and found.low["a"] > 0
     net, asked = net_scores(replace(panel, preference=moved))
     x = np.array([level[name] for name in panel.participants])
-    assert found.spearman["a"] == pytest.approx(stats.spearmanr(x, net[:, 0] / asked[:, 0]).statistic)
+    assert found.spearman["a"] == pytest.approx(
+        stats.spearmanr(x, net[:, 0] / asked[:, 0]).statistic
+    )
     assert found.slope["a"] == pytest.approx(stats.linregress(x, net[:, 0] / asked[:, 0]).slope)
     assert found.p["c"] == pytest.approx(stats.spearmanr(x, net[:, 2]).pvalue, abs=0.05)
 
 
 def test_familiarity_says_what_it_could_not_have_found(three, table):
-    responses = table(*three, familiarity={name: 1 + k % 5 for k, name in enumerate(three[0].participants)})
+    responses = table(
+        *three, familiarity={name: 1 + k % 5 for k, name in enumerate(three[0].participants)}
+    )
     found = familiarity_interaction(responses, FAST)
-    # n for a correlation of 0.6 with a power of 0.8: 19 by G*Power's tables for Pearson; Spearman needs some 6 % more beyond 3
+    # n for a correlation of 0.6 with a power of 0.8: 19 by G*Power's tables for Pearson; Spearman
+    # needs some 6 % more beyond 3
     assert found.detectable.between(0.58, 0.62).all() and (found.n == 20).all()
-    assert any("0.3 with familiarity is found with a probability of 0.2" in note for note in found.attrs["notes"])
+    assert any(
+        "0.3 with familiarity is found with a probability of 0.2" in note
+        for note in found.attrs["notes"]
+    )
 
 
 def test_familiarity_that_does_not_vary_says_nothing(three, table):
     found = familiarity_interaction(table(*three), FAST)
-    assert found.empty and any("all rated their familiarity 3" in note for note in found.attrs["notes"])
+    assert found.empty and any(
+        "all rated their familiarity 3" in note for note in found.attrs["notes"]
+    )
     few = familiarity_interaction(table(three[0].chosen(np.arange(3))), FAST)
-    assert few.empty and any("3 participants judged every technique" in note for note in few.attrs["notes"])
+    assert few.empty and any(
+        "3 participants judged every technique" in note for note in few.attrs["notes"]
+    )

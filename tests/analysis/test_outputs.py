@@ -1,4 +1,6 @@
-"""LaTeX, PDF, methods, declared choices, cost beside worth: whole, embedded, escaped, marked, and true to the tables."""
+"""LaTeX, PDF, methods, declared choices, cost beside worth: whole, embedded, escaped, marked, and
+true to the tables.
+"""
 
 import io
 import json
@@ -12,13 +14,29 @@ import pytest
 from PIL import Image
 from scipy import stats
 
-from analysis import InputError, declared, latex, methods, objective, pdf, read_responses, shown, worth_figures
+from analysis import (
+    InputError,
+    declared,
+    latex,
+    methods,
+    objective,
+    pdf,
+    read_responses,
+    shown,
+    worth_figures,
+)
 from analysis.codebook import Codebook
 from analysis.figures import DOUBLE_MM, SIMULATED, SINGLE_MM
 from analysis.options import Options
 from analysis.shown import Shown
 
-TABLE = Shown("one", "A table", ("Name & co", "p"), (False, True), (("50 % of #1_x", "<0.001"), ("\N{MINUS SIGN}1", "[a]"), ("\N{MINUS SIGN}1", "2")))
+TABLE = Shown(
+    "one",
+    "A table",
+    ("Name & co", "p"),
+    (False, True),
+    (("50 % of #1_x", "<0.001"), ("\N{MINUS SIGN}1", "[a]"), ("\N{MINUS SIGN}1", "2")),
+)
 
 
 # Numbers as they are printed
@@ -26,15 +44,31 @@ TABLE = Shown("one", "A table", ("Name & co", "p"), (False, True), (("50 % of #1
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0004, "<0.001"), (0.001, "0.001"), (0.0456, "0.046"), (0.1, "0.10"), (0.99, "0.99"), (0.996, ">0.99"), (1.0, ">0.99"), (np.nan, "\N{EN DASH}")],
+    [
+        (0.0004, "<0.001"),
+        (0.001, "0.001"),
+        (0.0456, "0.046"),
+        (0.1, "0.10"),
+        (0.99, "0.99"),
+        (0.996, ">0.99"),
+        (1.0, ">0.99"),
+        (np.nan, "\N{EN DASH}"),
+    ],
 )
 def test_p_values_as_journals_print_them(value, text):
     assert shown.probability(value) == text
 
 
 def test_numbers_have_a_true_minus_no_minus_zero_and_a_dash_for_nothing():
-    assert shown.number(-1.234) == "\N{MINUS SIGN}1.23" and shown.number(-0.001) == "0.00" and shown.number(np.nan) == "\N{EN DASH}"
-    assert shown.interval(1, 0.5, np.nan) == "1.00" and shown.interval(1, -0.5, 2) == "1.00 [\N{MINUS SIGN}0.50, 2.00]"
+    assert (
+        shown.number(-1.234) == "\N{MINUS SIGN}1.23"
+        and shown.number(-0.001) == "0.00"
+        and shown.number(np.nan) == "\N{EN DASH}"
+    )
+    assert (
+        shown.interval(1, 0.5, np.nan) == "1.00"
+        and shown.interval(1, -0.5, 2) == "1.00 [\N{MINUS SIGN}0.50, 2.00]"
+    )
 
 
 # LaTeX
@@ -45,7 +79,11 @@ def test_latex_escapes_and_keeps_every_row():
     assert r"Name \& co & p \\" in text and r"50 \% of \#1\_x & \textless{}0.001 \\" in text
     assert r"$-$1 & {}[a] \\" in text, "a bracket after a row's end would be read as a length"
     assert r" & 2 \\" in text and text.count(r"\addlinespace") == 1
-    assert all(rule in text for rule in (r"\toprule", r"\midrule", r"\bottomrule")) and r"\hline" not in text and "|" not in text
+    assert (
+        all(rule in text for rule in (r"\toprule", r"\midrule", r"\bottomrule"))
+        and r"\hline" not in text
+        and "|" not in text
+    )
 
 
 def test_latex_of_simulated_answers_is_marked_in_every_caption():
@@ -56,8 +94,12 @@ def test_latex_of_simulated_answers_is_marked_in_every_caption():
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no LaTeX here")
 def test_latex_compiles(tmp_path):
-    (tmp_path / "report.tex").write_text(latex.document([TABLE], "50 % & more", simulated=True), "utf-8")
-    subprocess.run(["pdflatex", "-halt-on-error", "report.tex"], cwd=tmp_path, check=True, capture_output=True)
+    (tmp_path / "report.tex").write_text(
+        latex.document([TABLE], "50 % & more", simulated=True), "utf-8"
+    )
+    subprocess.run(
+        ["pdflatex", "-halt-on-error", "report.tex"], cwd=tmp_path, check=True, capture_output=True
+    )
 
 
 def test_latex_braces_are_balanced(study_report):
@@ -86,12 +128,14 @@ def test_figures_have_the_widths_of_a_journals_columns_and_embedded_fonts(study_
         if name.startswith("figures/") and name.endswith(".pdf"):
             box = re.search(rb"/MediaBox \[ 0 0 ([0-9.]+) ([0-9.]+) \]", content)
             widths.add(round(float(box[1]) / 72 * 25.4, 1))
-            assert b"/FontFile2" in content and b"/Type3" not in content, f"{name}: TrueType, embedded"
+            assert b"/FontFile2" in content and b"/Type3" not in content, (
+                f"{name}: TrueType, embedded"
+            )
     assert widths == {SINGLE_MM, DOUBLE_MM}
 
 
 def test_the_pdf_is_one_with_embedded_fonts_and_no_date(study_report):
-    for simulated, files in study_report.items():
+    for _simulated, files in study_report.items():
         content = files["report.pdf"]
         assert content.startswith(b"%PDF-1.") and b"CreationDate" not in content
         assert content.count(b"/FontFile3") + content.count(b"/FontFile2") >= 2
@@ -101,24 +145,48 @@ def test_the_pdf_is_one_with_embedded_fonts_and_no_date(study_report):
 def test_the_pdf_says_what_the_page_says(tmp_path, study_report):
     for simulated, files in study_report.items():
         (tmp_path / "report.pdf").write_bytes(files["report.pdf"])
-        text = subprocess.run(["pdftotext", "-layout", tmp_path / "report.pdf", "-"], capture_output=True, text=True, check=True).stdout
+        text = subprocess.run(
+            ["pdftotext", "-layout", tmp_path / "report.pdf", "-"],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
         pages = text.split("\f")[:-1]
         assert all((SIMULATED in page) == simulated for page in pages) and len(pages) > 5
         words = " ".join(text.split())
-        for part in ("What can be concluded", "What cannot be concluded", "Methods", "References", "TOST Holm p"):
+        for part in (
+            "What can be concluded",
+            "What cannot be concluded",
+            "Methods",
+            "References",
+            "TOST Holm p",
+        ):
             assert part in words
 
 
 def test_typst_markup_in_a_name_stays_text():
-    table = Shown("x", "#panic(1)", ("*a*", "$b$"), (False, False), (("#import \"x\"", "_c_"),))
-    content = pdf.make("#panic()", "= x", [("h", ["#read(\"/etc/passwd\")"])], [], [table], [("h", "@x")], ["<r>"], True)
+    table = Shown("x", "#panic(1)", ("*a*", "$b$"), (False, False), (('#import "x"', "_c_"),))
+    content = pdf.make(
+        "#panic()",
+        "= x",
+        [("h", ['#read("/etc/passwd")'])],
+        [],
+        [table],
+        [("h", "@x")],
+        ["<r>"],
+        True,
+    )
     assert content.startswith(b"%PDF")
 
 
 def test_methods_name_every_choice_seed_version_and_source(study_report):
     text = study_report[False]["methods.md"].decode()
     assert "resample participants, with all of their answers, 100 times (seed 3)" in text
-    assert "\N{PLUS-MINUS SIGN}0.25 points" in text and "\N{PLUS-MINUS SIGN}0.5 JOD" in text and "declared in the study file" in text
+    assert (
+        "\N{PLUS-MINUS SIGN}0.25 points" in text
+        and "\N{PLUS-MINUS SIGN}0.5 JOD" in text
+        and "declared in the study file" in text
+    )
     for simulated, files in study_report.items():
         text = files["methods.md"].decode()
         assert (SIMULATED in text) == simulated and ("SIMULATED participants" in text) == simulated
@@ -131,8 +199,16 @@ def test_methods_name_every_choice_seed_version_and_source(study_report):
 
 def test_methods_follow_the_options(write, answer):
     responses = read_responses(write([answer("P1", "close-up", "a", "b", 1)]))
-    text = methods.markdown(responses, Options(test="sign", family="framing", ties="drop", level=0.9, seed=7), "nowhere")
-    for words in ("The declared test is the sign test", "over the pairs of each framing, at 0.1", "'no difference' left out", "at 90 %", "seed 7"):
+    text = methods.markdown(
+        responses, Options(test="sign", family="framing", ties="drop", level=0.9, seed=7), "nowhere"
+    )
+    for words in (
+        "The declared test is the sign test",
+        "over the pairs of each framing, at 0.1",
+        "'no difference' left out",
+        "at 90 %",
+        "seed 7",
+    ):
         assert words in text
     assert "No margin of equivalence was declared" in text
 
@@ -140,7 +216,16 @@ def test_methods_follow_the_options(write, answer):
 def test_objective_figures_tables_and_sentences_are_there(study_report):
     files = study_report[False]
     table = pd.read_csv(io.BytesIO(files["tables/objective.csv"]))
-    assert list(table) == ["framing", "technique", "measure", "value", "estimate", "low", "high", "front"]
+    assert list(table) == [
+        "framing",
+        "technique",
+        "measure",
+        "value",
+        "estimate",
+        "low",
+        "high",
+        "front",
+    ]
     assert "figures/objective_milliseconds.pdf" in files
     page = files["report.html"].decode()
     assert "milliseconds an image against worth" in page and "The manifest holds no FLIP." in page
@@ -150,9 +235,17 @@ def test_objective_figures_tables_and_sentences_are_there(study_report):
 
 
 def test_declared_choices_become_options_and_the_command_line_wins():
-    found = declared.options({"margin": 0.3, "test": "sign", "exclusions": {"zeta": 0.5, "median_rt_ms": False}}, margin=0.2, seed=None)
+    found = declared.options(
+        {"margin": 0.3, "test": "sign", "exclusions": {"zeta": 0.5, "median_rt_ms": False}},
+        margin=0.2,
+        seed=None,
+    )
     assert (found.margin, found.test, found.seed) == (0.2, "sign", 0)
-    assert found.exclusions.zeta == 0.5 and found.exclusions.median_rt_ms is None and found.exclusions.one_side_share == 0.9
+    assert (
+        found.exclusions.zeta == 0.5
+        and found.exclusions.median_rt_ms is None
+        and found.exclusions.one_side_share == 0.9
+    )
     assert declared.options({}) == Options()
 
 
@@ -180,32 +273,49 @@ def test_declared_nonsense_is_refused_in_one_line(table, message):
 
 
 def manifest(tmp_path, images):
-    (tmp_path / "manifest.json").write_text(json.dumps({"format": "subdermal-manifest/1", "images": images}))
+    (tmp_path / "manifest.json").write_text(
+        json.dumps({"format": "subdermal-manifest/1", "images": images})
+    )
     return tmp_path
 
 
 def test_what_the_manifest_does_not_hold_is_said_and_nothing_is_made_up(tmp_path):
-    found = objective.read_measures(manifest(tmp_path, [{"framing": "x", "technique": "a", "parameters": {"samples": 22}}]))
+    found = objective.read_measures(
+        manifest(tmp_path, [{"framing": "x", "technique": "a", "parameters": {"samples": 22}}])
+    )
     assert found.table.empty
     text = " ".join(found.notes)
-    assert "No condition is called 'reference'" in text and "no samples a scattering pixel and no milliseconds an image" in text
+    assert (
+        "No condition is called 'reference'" in text
+        and "no samples a scattering pixel and no milliseconds an image" in text
+    )
 
 
 def test_measures_are_read_and_partial_ones_are_said(tmp_path):
-    images = [{"framing": "x", "technique": "a", "measures": {"milliseconds": 2}}, {"framing": "x", "technique": "b"}]
+    images = [
+        {"framing": "x", "technique": "a", "measures": {"milliseconds": 2}},
+        {"framing": "x", "technique": "b"},
+    ]
     found = objective.read_measures(manifest(tmp_path, images))
     assert found.table.to_numpy().tolist() == [["x", "a", "milliseconds", 2.0, "manifest"]]
     assert "1 of 2 images in the manifest have no milliseconds an image." in found.notes
 
 
-@pytest.mark.parametrize("measures", [{"ms": 1}, {"milliseconds": -1}, {"milliseconds": True}, {"milliseconds": "1"}, [1]])
+@pytest.mark.parametrize(
+    "measures",
+    [{"ms": 1}, {"milliseconds": -1}, {"milliseconds": True}, {"milliseconds": "1"}, [1]],
+)
 def test_bad_measures_are_refused(tmp_path, measures):
     with pytest.raises(InputError, match=r"images\[0\].measures"):
-        objective.read_measures(manifest(tmp_path, [{"framing": "x", "technique": "a", "measures": measures}]))
+        objective.read_measures(
+            manifest(tmp_path, [{"framing": "x", "technique": "a", "measures": measures}])
+        )
 
 
 def test_dssim_is_wang_and_others_formula_window_by_window():
-    """Against an independent way: explicit 11 x 11 windows with normalised Gaussian weights, as the paper's section III-B says."""
+    """Against an independent way: explicit 11 x 11 windows with normalised Gaussian weights, as the
+    paper's section III-B says.
+    """
     rng = np.random.default_rng(0)
     x = rng.random((16, 18))
     y = np.clip(x + rng.normal(0, 0.2, x.shape), 0, 1)
@@ -218,7 +328,11 @@ def test_dssim_is_wang_and_others_formula_window_by_window():
             mean_a, mean_b = (weight * a).sum(), (weight * b).sum()
             var_a, var_b = (weight * (a - mean_a) ** 2).sum(), (weight * (b - mean_b) ** 2).sum()
             cov = (weight * (a - mean_a) * (b - mean_b)).sum()
-            values.append((2 * mean_a * mean_b + 1e-4) * (2 * cov + 9e-4) / ((mean_a**2 + mean_b**2 + 1e-4) * (var_a + var_b + 9e-4)))
+            values.append(
+                (2 * mean_a * mean_b + 1e-4)
+                * (2 * cov + 9e-4)
+                / ((mean_a**2 + mean_b**2 + 1e-4) * (var_a + var_b + 9e-4))
+            )
     grey_x, grey_y = (np.repeat(image[..., None], 3, axis=2) for image in (x, y))
     assert objective.dssim(grey_x, grey_y) == pytest.approx((1 - np.mean(values)) / 2, rel=1e-9)
     assert objective.dssim(grey_x, grey_x) == pytest.approx(0, abs=1e-12)
@@ -244,11 +358,17 @@ def test_distances_to_the_reference_come_from_the_images(tmp_path):
 
 def test_the_front_is_what_no_other_beats_in_both():
     measured = pd.DataFrame(
-        [("x", name, "milliseconds", cost, "manifest") for name, cost in (("a", 1.0), ("b", 2.0), ("c", 2.0), ("d", 3.0))],
+        [
+            ("x", name, "milliseconds", cost, "manifest")
+            for name, cost in (("a", 1.0), ("b", 2.0), ("c", 2.0), ("d", 3.0))
+        ],
         columns=["framing", "technique", "measure", "value", "source"],
     )
     worths = pd.DataFrame(
-        [("x", "thurstone_jod", name, worth, np.nan, np.nan) for name, worth in (("a", 0.0), ("b", 1.0), ("c", 0.5), ("d", 1.0))],
+        [
+            ("x", "thurstone_jod", name, worth, np.nan, np.nan)
+            for name, worth in (("a", 0.0), ("b", 1.0), ("c", 0.5), ("d", 1.0))
+        ],
         columns=["framing", "model", "technique", "estimate", "low", "high"],
     )
     table = objective.against_worth(measured, worths)
@@ -258,10 +378,15 @@ def test_the_front_is_what_no_other_beats_in_both():
 def test_rank_correlations_are_spearmans_with_every_order_counted():
     rng = np.random.default_rng(2)
     for n in (4, 5, 6):
-        table = pd.DataFrame({"framing": "x", "measure": "flip", "value": rng.random(n), "estimate": rng.random(n)})
+        table = pd.DataFrame(
+            {"framing": "x", "measure": "flip", "value": rng.random(n), "estimate": rng.random(n)}
+        )
         row = objective.correlations(table).iloc[0]
         exact = stats.permutation_test(
-            (table.value,), lambda x: stats.spearmanr(x, table.estimate).statistic, permutation_type="pairings", n_resamples=np.inf
+            (table.value,),
+            lambda x, estimate=table.estimate: stats.spearmanr(x, estimate).statistic,
+            permutation_type="pairings",
+            n_resamples=np.inf,
         )
         assert (row.spearman, row.p) == pytest.approx((exact.statistic, exact.pvalue))
     short = objective.correlations(table.head(3)).iloc[0]
@@ -274,12 +399,23 @@ def test_rank_correlations_are_spearmans_with_every_order_counted():
 def test_labels_keep_their_distance_and_their_order():
     for values in ([0.0, 0.0, 0.0], [0, 1, 2], [0, 0.1, 0.1, 3, 3.05], [5.0]):
         places = worth_figures._apart(np.array(values, float), 0.5)
-        assert (np.diff(places) >= 0.5 - 1e-9).all() and places.mean() == pytest.approx(np.mean(values))
+        assert (np.diff(places) >= 0.5 - 1e-9).all() and places.mean() == pytest.approx(
+            np.mean(values)
+        )
 
 
 def test_pairs_are_drawn_on_their_side_with_the_margin():
     book = Codebook(("x",), ("a", "b"), "", "")
-    row = {"framing": "x", "a": "a", "b": "b", "mean_preference": 1.2, "low": 0.8, "high": 1.5, "equivalence_low": 0.9, "equivalence_high": 1.4}
+    row = {
+        "framing": "x",
+        "a": "a",
+        "b": "b",
+        "mean_preference": 1.2,
+        "low": 0.8,
+        "high": 1.5,
+        "equivalence_low": 0.9,
+        "equivalence_high": 1.4,
+    }
     axes = worth_figures._pairs(pd.DataFrame([row | {"verdict": "different"}]), book, 0.25).axes
     dot = next(line for line in axes[0].lines if line.get_marker() == "o")
     assert dot.get_xdata()[0] == 1.2

@@ -1,4 +1,6 @@
-"""How many people: against closed forms, statsmodels, scipy and published numbers; seeds, designs, and what must be refused."""
+"""How many people: against closed forms, statsmodels, scipy and published numbers; seeds, designs,
+and what must be refused.
+"""
 
 import math
 import re
@@ -11,7 +13,18 @@ from statsmodels.stats.power import TTestPower
 
 from analysis import InputError, read_responses
 from analysis.power import (
-    SIGMA, Answering, Plan, _Run, closed_form, fit_pilot, people_grid, plan_table, sign_p, t_power, tost_power, wilcoxon_p,
+    SIGMA,
+    Answering,
+    Plan,
+    _Run,
+    closed_form,
+    fit_pilot,
+    people_grid,
+    plan_table,
+    sign_p,
+    t_power,
+    tost_power,
+    wilcoxon_p,
 )  # fmt: skip
 from app.cli import main
 
@@ -26,7 +39,10 @@ def run_of(plan, design="full", framing="any"):
 
 
 def plan(**changes):
-    return Plan(**{"techniques": THESIS, "pair": PAIR, "studies": 400, "most": 120, "difference": 0.8} | changes)
+    return Plan(
+        **{"techniques": THESIS, "pair": PAIR, "studies": 400, "most": 120, "difference": 0.8}
+        | changes
+    )
 
 
 @pytest.fixture(scope="module")
@@ -46,22 +62,32 @@ def test_one_jod_is_preferred_by_three_of_four():
 @pytest.mark.parametrize("effect", [0.2, 0.5, 0.8])
 @pytest.mark.parametrize("people", [5, 20, 60])
 def test_the_power_of_the_t_test_is_that_of_statsmodels(effect, people):
-    assert t_power(effect, people, 0.05) == pytest.approx(TTestPower().power(effect, people, 0.05), abs=1e-8)
+    assert t_power(effect, people, 0.05) == pytest.approx(
+        TTestPower().power(effect, people, 0.05), abs=1e-8
+    )
 
 
 def test_the_classic_sample_sizes_come_out():
-    """Cohen 1988, table 2.3.5 and G*Power: a one-sample t test finds d = 0.5 with power 0.8 from 34 people on, d = 0.2 from 199 on."""
+    """Cohen 1988, table 2.3.5 and G*Power: a one-sample t test finds d = 0.5 with power 0.8 from 34
+    people on, d = 0.2 from 199 on.
+    """
     for effect, people in ((0.5, 34), (0.2, 199)):
         assert t_power(effect, people) >= 0.8 > t_power(effect, people - 1)
 
 
 def test_noethers_sample_size_of_the_sign_test():
-    """Noether 1987, JASA 82(398), doi:10.1080/01621459.1987.10478478: N = (z_alpha + z_beta)^2/(4 (p - 1/2)^2), 31.4 for p = 0.75."""
+    """Noether 1987, JASA 82(398), doi:10.1080/01621459.1987.10478478: N = (z_alpha + z_beta)^2/(4
+    (p - 1/2)^2), 31.4 for p = 0.75.
+    """
     noether = (stats.norm.ppf(0.975) + stats.norm.ppf(0.8)) ** 2 / (4 * 0.25**2)
     assert noether == pytest.approx(31.4, abs=0.05)
     forced = plan(difference=1.0, answering=Answering(0.0, 1.8, 0.0))
     powers = {people: closed_form(forced, "find", "sign", people, 0.05) for people in range(25, 45)}
-    enough = min(people for people in powers if all(powers[more] >= 0.75 for more in powers if more >= people))
+    enough = min(
+        people
+        for people in powers
+        if all(powers[more] >= 0.75 for more in powers if more >= people)
+    )
     assert abs(enough - noether) < 6
 
 
@@ -69,7 +95,9 @@ def test_the_sign_tests_power_is_the_binomials():
     forced = plan(difference=1.0, answering=Answering(0.0, 1.8, 0.0))
     counts = np.arange(21)
     rejected = np.array([stats.binomtest(int(count), 20).pvalue <= 0.05 for count in counts])
-    assert closed_form(forced, "find", "sign", 20, 0.05) == pytest.approx(stats.binom.pmf(counts, 20, 0.75)[rejected].sum())
+    assert closed_form(forced, "find", "sign", 20, 0.05) == pytest.approx(
+        stats.binom.pmf(counts, 20, 0.75)[rejected].sum()
+    )
 
 
 def test_equivalences_power_is_that_of_a_simulation_and_of_no_margin():
@@ -88,7 +116,9 @@ def test_simulation_and_closed_form_agree(simulated):
     exact = known[known.test == "sign"]
     error = np.sqrt(np.maximum(exact.closed_form * (1 - exact.closed_form), 1e-4) / 1500)
     assert (np.abs(exact.power - exact.closed_form) / error).max() < 4
-    close = known[(known.test == "mean") & (known.people >= 30)]  # five answers are not normal: close from thirty people on
+    close = known[
+        (known.test == "mean") & (known.people >= 30)
+    ]  # five answers are not normal: close from thirty people on
     assert np.abs(close.power - close.closed_form).max() < 0.05
 
 
@@ -101,7 +131,11 @@ def test_false_alarms_are_at_most_as_many_as_alpha_allows(simulated):
 def test_needed_people_reach_the_power_and_fewer_do_not(simulated):
     curves, needed = simulated
     for row in needed[needed.people.notna()].itertuples():
-        here = curves[(curves.goal == row.goal) & (curves.test == row.test) & (curves.correction == row.correction)]
+        here = curves[
+            (curves.goal == row.goal)
+            & (curves.test == row.test)
+            & (curves.correction == row.correction)
+        ]
         assert row.power >= 0.8
         below = here[here.people < row.people]
         assert below.empty or below.power.iloc[-1] < 0.8
@@ -116,13 +150,17 @@ def test_sign_and_wilcoxon_p_are_scipys():
             continue
         up, down = (answers > 0).sum(), (answers < 0).sum()
         assert sign_p(counts) == pytest.approx(stats.binomtest(int(up), int(up + down)).pvalue)
-        theirs = stats.wilcoxon(answers[answers != 0], zero_method="wilcox", correction=False, method="asymptotic").pvalue
+        theirs = stats.wilcoxon(
+            answers[answers != 0], zero_method="wilcox", correction=False, method="asymptotic"
+        ).pvalue
         assert wilcoxon_p(counts) == pytest.approx(theirs)
     assert sign_p(np.array([0, 0, 9, 0, 0])) == wilcoxon_p(np.array([0, 0, 9, 0, 0])) == 1
 
 
 def test_worths_of_a_full_design_are_a_t_test_of_each_persons_scores():
-    """An independent way to the same test: with every pair asked, the clustered least squares are the participants' own differences."""
+    """An independent way to the same test: with every pair asked, the clustered least squares are
+    the participants' own differences.
+    """
     run, answers = run_of(plan(studies=60, most=30))
     estimate, error, _ = run._least_squares(30)
     ends = run.ends
@@ -142,7 +180,9 @@ def test_designs_ask_what_they_say_and_everyone_is_asked_so_many():
 
 def test_the_adaptive_design_asks_near_pairs_more_often_than_far_ones():
     worths = {"here": dict(zip(THESIS, (-3.0, -1.5, 0.0, 0.2, 3.0), strict=True))}
-    run, _ = run_of(plan(studies=50, most=60, answers_each=3, worths=worths, difference=0.2), "adaptive", "here")
+    run, _ = run_of(
+        plan(studies=50, most=60, answers_each=3, worths=worths, difference=0.2), "adaptive", "here"
+    )
     asked = dict(zip(run.plan.pairs, run.asked.mean(axis=(0, 1)), strict=True))
     assert asked[(2, 3)] > 1.5 * asked[(0, 4)]
 
@@ -150,26 +190,48 @@ def test_the_adaptive_design_asks_near_pairs_more_often_than_far_ones():
 def test_more_people_larger_differences_and_more_answers_give_more_power():
     people = people_grid(120)[8]
     curves, _ = plan_table(plan(), ("full", "incomplete"))
-    found = curves[(curves.goal == "find") & (curves.test == "worths") & (curves.people == people)].set_index("design").power
+    found = (
+        curves[(curves.goal == "find") & (curves.test == "worths") & (curves.people == people)]
+        .set_index("design")
+        .power
+    )
     assert found["full"] > found["incomplete"]
     larger, _ = plan_table(plan(difference=1.6), ("full",))
-    more = larger[(larger.goal == "find") & (larger.test == "worths") & (larger.people == people)].power.iloc[0]
+    more = larger[
+        (larger.goal == "find") & (larger.test == "worths") & (larger.people == people)
+    ].power.iloc[0]
     assert more > found["full"]
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_one_others():
-    one, two, other = (plan_table(plan(studies=80, seed=seed), ("incomplete",))[0] for seed in (1, 1, 2))
+    one, two, other = (
+        plan_table(plan(studies=80, seed=seed), ("incomplete",))[0] for seed in (1, 1, 2)
+    )
     pd.testing.assert_frame_equal(one, two)
     assert not one.power.equals(other.power)
 
 
 def test_a_pilot_gives_back_what_it_was_drawn_from(write):
-    """A known truth, drawn by `analysis.power`'s own model with 400 people: worths within 0.25 JOD, cuts within 0.15 JOD."""
+    """A known truth, drawn by `analysis.power`'s own model with 400 people: worths within 0.25 JOD,
+    cuts within 0.15 JOD.
+    """
     worths = {"close-up": dict(zip(THESIS, (-1.0, -0.4, 0.4, 0.8, 0.2), strict=True))}
-    truth = plan(studies=50, most=400, worths=worths, difference=0.4, answering=Answering(0.6, 1.7, 0.3))
+    truth = plan(
+        studies=50, most=400, worths=worths, difference=0.4, answering=Answering(0.6, 1.7, 0.3)
+    )
     _, answers = run_of(truth, "full", "close-up")
     rows = [
-        (f"P{person}", 3, "close-up", THESIS[a], THESIS[b], int(answers[0, person, k]), k + 1, 900, "2024-05-01T09:00:00Z")
+        (
+            f"P{person}",
+            3,
+            "close-up",
+            THESIS[a],
+            THESIS[b],
+            int(answers[0, person, k]),
+            k + 1,
+            900,
+            "2024-05-01T09:00:00Z",
+        )
         for person in range(400)
         for k, (a, b) in enumerate(truth.pairs)
     ]
@@ -181,7 +243,11 @@ def test_a_pilot_gives_back_what_it_was_drawn_from(write):
 
 @pytest.mark.parametrize(
     ("answers", "message"),
-    [([("a", "b", 2)] * 6, "no finite worths"), ([("a", "b", 0)] * 6, "no finite worths"), ([("a", "b", 1), ("c", "d", -1)], "separate groups")],
+    [
+        ([("a", "b", 2)] * 6, "no finite worths"),
+        ([("a", "b", 0)] * 6, "no finite worths"),
+        ([("a", "b", 1), ("c", "d", -1)], "separate groups"),
+    ],
 )
 def test_a_pilot_without_worths_is_refused(write, answer, answers, message):
     path = write([answer(f"P{person}", "close-up", *row) for person, row in enumerate(answers)])
@@ -213,7 +279,10 @@ def test_a_plan_that_cannot_be_is_refused_in_one_line(changes, message):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(("values", "message"), [((-1, 1, 0), "slight is -1"), ((2, 1, 0), "at least slight"), ((0, 1, 1.6), "taste is 1.6")])
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [((-1, 1, 0), "slight is -1"), ((2, 1, 0), "at least slight"), ((0, 1, 1.6), "taste is 1.6")],
+)
 def test_answering_that_cannot_be_is_refused(values, message):
     with pytest.raises(InputError, match=message):
         Answering(*values)
@@ -223,19 +292,52 @@ def test_answering_that_cannot_be_is_refused(values, message):
 
 
 def test_the_command_writes_marked_tables_a_figure_and_a_page(tmp_path, capsys):
-    arguments = ["power", "stimuli/studies/thesis.toml", "--design", "full", "--studies", "60", "--most", "40", "--worth", "none=-0.5"]
+    arguments = [
+        "power",
+        "stimuli/studies/thesis.toml",
+        "--design",
+        "full",
+        "--studies",
+        "60",
+        "--most",
+        "40",
+        "--worth",
+        "none=-0.5",
+    ]
     assert main([*arguments, "--out", str(tmp_path / "one")]) == 0
     out = capsys.readouterr().out
-    assert re.search(r"full design, 10 of 10 pairs a person and framing: to find 0\.5 JOD between Golubev and Golubev Plus", out)
+    assert re.search(
+        (
+            r"full design, 10 of 10 pairs a person and framing: to find 0\.5 JOD between Golubev "
+            r"and Golubev Plus"
+        ),
+        out,
+    )
     assert main([*arguments, "--out", str(tmp_path / "two")]) == 0
-    files = {path.relative_to(tmp_path / "one").as_posix(): path.read_bytes() for path in (tmp_path / "one").rglob("*") if path.is_file()}
-    assert set(files) == {"power.csv", "needed.csv", "power.md", *(f"figures/power.{kind}" for kind in ("pdf", "png", "svg"))}
+    files = {
+        path.relative_to(tmp_path / "one").as_posix(): path.read_bytes()
+        for path in (tmp_path / "one").rglob("*")
+        if path.is_file()
+    }
+    assert set(files) == {
+        "power.csv",
+        "needed.csv",
+        "power.md",
+        *(f"figures/power.{kind}" for kind in ("pdf", "png", "svg")),
+    }
     assert all((tmp_path / "two" / name).read_bytes() == content for name, content in files.items())
     for name in ("power.csv", "needed.csv"):
         assert (pd.read_csv(tmp_path / "one" / name).simulated == 1).all()
     page = files["power.md"].decode()
-    assert "SIMULATED ANSWERS" in page and "seed 1" in page and "No SSS \N{MINUS SIGN}0.40" in page.replace("-0.40", "\N{MINUS SIGN}0.40")
-    assert "subdermal power thesis.toml --worth none=-0.5 --design full --most 40 --studies 60 --out DIR" in page
+    assert (
+        "SIMULATED ANSWERS" in page
+        and "seed 1" in page
+        and "No SSS \N{MINUS SIGN}0.40" in page.replace("-0.40", "\N{MINUS SIGN}0.40")
+    )
+    assert (
+        "subdermal power thesis.toml --worth none=-0.5 --design full --most 40 --studies 60 "
+        "--out DIR"
+    ) in page
     assert b"SIMULATED ANSWERS" in files["figures/power.svg"]
 
 
@@ -256,4 +358,9 @@ def test_what_the_command_cannot_do_is_one_line(tmp_path, capsys, options, expec
     options = [option.format(study="stimuli/studies/thesis.toml") for option in options]
     code = main(["power", *options, "--out", str(tmp_path / "out")])
     done = capsys.readouterr()
-    assert code == 2 and done.err.count("\n") == 1 and expected in done.err and not (tmp_path / "out").exists()
+    assert (
+        code == 2
+        and done.err.count("\n") == 1
+        and expected in done.err
+        and not (tmp_path / "out").exists()
+    )

@@ -1,4 +1,6 @@
-"""Reading a table: what is kept, what is reported, what is refused. Nothing is dropped in silence."""
+"""Reading a table: what is kept, what is reported,
+what is refused. Nothing is dropped in silence.
+"""
 
 import json
 
@@ -74,7 +76,10 @@ MALFORMED = {
 }
 
 
-@pytest.mark.parametrize(("column", "value"), [(column, value) for column, values in MALFORMED.items() for value in values])
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [(column, value) for column, values in MALFORMED.items() for value in values],
+)
 def test_a_malformed_value_is_reported_with_its_line_and_its_column(write, column, value):
     cells = GOOD.split(",")
     cells[HEADER.split(",").index(column)] = value
@@ -86,7 +91,9 @@ def test_a_malformed_value_is_reported_with_its_line_and_its_column(write, colum
     assert len(responses.frame) == 1 and responses.rows == 2
 
 
-@pytest.mark.parametrize("row", ["P1,3,close-up", GOOD + ",more", 'P1,"3"x,close-up,a,b,0,1,1,2024-05-01T09:00:00Z'])
+@pytest.mark.parametrize(
+    "row", ["P1,3,close-up", GOOD + ",more", 'P1,"3"x,close-up,a,b,0,1,1,2024-05-01T09:00:00Z']
+)
 def test_a_row_that_has_not_the_headers_fields_is_reported(write, row):
     responses = read_responses(write([GOOD, row, GOOD.replace("P1", "P2")]))
     assert [(one.line, one.row) for one in responses.findings] == [(3, row)]
@@ -95,17 +102,28 @@ def test_a_row_that_has_not_the_headers_fields_is_reported(write, row):
 
 def test_a_row_over_several_lines_names_them_and_later_rows_keep_their_numbers(write):
     header = HEADER + ",comment"
-    rows = [GOOD + ',"first\nsecond"', GOOD.replace(",3,", ",9,") + ',"one\ntwo\nthree"', GOOD.replace("P1", "P2") + ","]
+    rows = [
+        GOOD + ',"first\nsecond"',
+        GOOD.replace(",3,", ",9,") + ',"one\ntwo\nthree"',
+        GOOD.replace("P1", "P2") + ",",
+    ]
     responses = read_responses(write(rows, header=header))
     (finding,) = responses.findings
-    assert (finding.line, finding.last_line) == (4, 6) and str(finding).startswith("lines 4 to 6: familiarity is '9'")
+    assert (finding.line, finding.last_line) == (4, 6) and str(finding).startswith(
+        "lines 4 to 6: familiarity is '9'"
+    )
     assert finding.row == rows[1]
     assert list(responses.frame.line) == [2, 7]
 
 
 def test_all_that_is_wrong_with_a_row_is_in_its_finding(write):
-    responses = read_responses(write([GOOD, "P1,9,close-up,golubev,none,7,1,1500,2024-05-01T09:00:00Z"]))
-    assert "familiarity is '9'" in responses.findings[0].reason and "answer is '7'" in responses.findings[0].reason
+    responses = read_responses(
+        write([GOOD, "P1,9,close-up,golubev,none,7,1,1500,2024-05-01T09:00:00Z"])
+    )
+    assert (
+        "familiarity is '9'" in responses.findings[0].reason
+        and "answer is '7'" in responses.findings[0].reason
+    )
 
 
 def test_of_duplicates_the_first_counts_whatever_the_side(write, answer):
@@ -117,7 +135,10 @@ def test_of_duplicates_the_first_counts_whatever_the_side(write, answer):
         answer("P1", "close-up", "a", "b", -1),
     ]
     responses = read_responses(write(rows))
-    assert [(one.line, one.kind) for one in responses.findings] == [(5, "duplicate"), (6, "duplicate")]
+    assert [(one.line, one.kind) for one in responses.findings] == [
+        (5, "duplicate"),
+        (6, "duplicate"),
+    ]
     assert all("line 2" in one.reason for one in responses.findings)
     assert list(responses.frame.line) == [2, 3, 4]
 
@@ -143,13 +164,25 @@ def test_every_row_is_either_counted_or_reported(write, random_study):
         (b"\xef\xbb\xbf \n", "is empty"),
         (HEADER.encode(), "no rows"),
         (HEADER.encode() + b"\n\n\n", "no rows"),
-        (b"participant,answer\nP1,2\n", "has no column familiarity, framing, left, right, order, rt_ms, started_at"),
+        (
+            b"participant,answer\nP1,2\n",
+            "has no column familiarity, framing, left, right, order, rt_ms, started_at",
+        ),
         (HEADER.replace(",", ";").encode() + b"\n", "separated by ';'"),
         (HEADER.replace(",", "\t").encode() + b"\n", "separated by '\\t'"),
         (HEADER.encode() + b",answer\n", "column answer twice"),
-        (HEADER.encode() + b"\nP1,9,close-up,a,b,0,1,1,2024\n", "none of its 1 rows can be used; line 2: familiarity is '9'"),
-        (HEADER.encode() + b'\nP1,"3,close-up,a,b,0,1,1,2024\nP2\n', "line 2: a quotation mark is opened and never closed"),
-        (HEADER.encode() + b"\nJos\xe9,3,close-up,a,b,0,1,1,2024\n", "line 2: byte 0xe9 is not UTF-8"),
+        (
+            HEADER.encode() + b"\nP1,9,close-up,a,b,0,1,1,2024\n",
+            "none of its 1 rows can be used; line 2: familiarity is '9'",
+        ),
+        (
+            HEADER.encode() + b'\nP1,"3,close-up,a,b,0,1,1,2024\nP2\n',
+            "line 2: a quotation mark is opened and never closed",
+        ),
+        (
+            HEADER.encode() + b"\nJos\xe9,3,close-up,a,b,0,1,1,2024\n",
+            "line 2: byte 0xe9 is not UTF-8",
+        ),
         (HEADER.encode("utf-16"), "not UTF-8"),
     ],
 )
@@ -185,14 +218,23 @@ def test_a_rejected_row_still_shows_that_kinds_are_mixed(write):
 
 def test_framings_without_a_study_go_from_near_to_far_then_as_they_appear(write, answer):
     seen = ["zoom", "half-length", "close-up", "aerial"]
-    codebook = read_responses(write([answer("P1", framing, "b", "a", 0) for framing in seen])).codebook
+    codebook = read_responses(
+        write([answer("P1", framing, "b", "a", 0) for framing in seen])
+    ).codebook
     assert codebook.framings == ("close-up", "half-length", "zoom", "aerial")
-    assert codebook.techniques == ("b", "a") and codebook.order_rule == "first appearance in the table"
+    assert (
+        codebook.techniques == ("b", "a") and codebook.order_rule == "first appearance in the table"
+    )
 
 
 @pytest.mark.parametrize(
     ("order", "expected"),
-    [("golubev", "lacks 'none'"), ("golubev,none,none", "twice 'none'"), ("golubev,none,x", "unknown 'x'"), ("", "lacks")],
+    [
+        ("golubev", "lacks 'none'"),
+        ("golubev,none,none", "twice 'none'"),
+        ("golubev,none,x", "unknown 'x'"),
+        ("", "lacks"),
+    ],
 )
 def test_an_order_names_every_technique_once(write, order, expected):
     with pytest.raises(InputError, match=expected) as error:
@@ -203,7 +245,11 @@ def test_an_order_names_every_technique_once(write, order, expected):
 def manifest(tmp_path, **study):
     table = {
         "framings": [{"name": "near", "label": "Near by"}, {"name": "far"}],
-        "techniques": [{"name": "b", "label": "Bee"}, {"name": "a", "label": "Ay"}, {"name": "c", "label": "Sea"}],
+        "techniques": [
+            {"name": "b", "label": "Bee"},
+            {"name": "a", "label": "Ay"},
+            {"name": "c", "label": "Sea"},
+        ],
         "title": "A study",
     } | study
     path = tmp_path / "manifest.json"
@@ -213,14 +259,22 @@ def manifest(tmp_path, **study):
 
 def test_a_study_gives_order_and_labels_and_finds_strangers(tmp_path, write, answer):
     codebook = read_manifest(manifest(tmp_path))
-    rows = [answer("P1", "far", "a", "b", 1), answer("P1", "afar", "a", "b", 1), answer("P1", "near", "a", "d", 1)]
+    rows = [
+        answer("P1", "far", "a", "b", 1),
+        answer("P1", "afar", "a", "b", 1),
+        answer("P1", "near", "a", "d", 1),
+    ]
     responses = read_responses(write(rows), codebook)
     assert responses.frame.a[0] == "b" and responses.frame.preference[0] == -1
     assert [one.line for one in responses.findings] == [3, 4]
-    assert "framing is 'afar', expected one of the study's: near, far" in responses.findings[0].reason
+    assert (
+        "framing is 'afar', expected one of the study's: near, far" in responses.findings[0].reason
+    )
     assert "right is 'd'" in responses.findings[1].reason
     assert codebook.label("b") == "Bee" and codebook.framing_label("far") == "far"
-    assert "No answers at near." in responses.notes and "No answers at all for c." in responses.notes
+    assert (
+        "No answers at near." in responses.notes and "No answers at all for c." in responses.notes
+    )
 
 
 @pytest.mark.parametrize(
@@ -232,7 +286,10 @@ def test_a_study_gives_order_and_labels_and_finds_strangers(tmp_path, write, ans
         (b'{"format": "subdermal-manifest/2"}', "format is 'subdermal-manifest/2'"),
         (b'{"format": "subdermal-manifest/1"}', "study is None"),
         (b'{"format": "subdermal-manifest/1", "study": {"framings": []}}', "study.framings is"),
-        (b'{"format": "subdermal-manifest/1", "study": {"framings": [{"name": 3}]}}', r"study.framings\[0\].name is 3"),
+        (
+            b'{"format": "subdermal-manifest/1", "study": {"framings": [{"name": 3}]}}',
+            r"study.framings\[0\].name is 3",
+        ),
     ],
 )
 def test_a_broken_manifest_is_refused_in_one_line(tmp_path, content, expected):
@@ -264,7 +321,9 @@ def test_what_a_reader_should_know_of_counted_rows_is_noted(write, answer):
 def test_records_give_what_the_file_gives(write, random_study):
     rows = random_study(3, seed=9)
     from_file = read_responses(write(rows))
-    from_records = responses_from_records([dict(zip(HEADER.split(","), row, strict=True)) for row in rows])
+    from_records = responses_from_records(
+        [dict(zip(HEADER.split(","), row, strict=True)) for row in rows]
+    )
     columns = ["participant", "framing", "a", "b", "preference", "rt_ms", "started_at"]
     assert from_file.frame[columns].equals(from_records.frame[columns])
     with pytest.raises(InputError, match="lack rt_ms"):

@@ -4,13 +4,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import distributions, familiarity, preferences, read_responses, scores, sides, totals, trend
+from analysis import (
+    distributions,
+    familiarity,
+    preferences,
+    read_responses,
+    scores,
+    sides,
+    totals,
+    trend,
+)
 from analysis.tallies import Trend
 
 
 @pytest.fixture
 def counted(write, answer):
-    """Three participants, two framings, three techniques; every number below was counted by hand from these lines."""
+    """Three participants, two framings, three techniques; every number below was counted by hand
+    from these lines.
+    """
     return read_responses(
         write(
             [
@@ -40,12 +51,18 @@ def test_scores_by_hand(counted):
 
 def test_totals_by_hand(counted):
     table = totals(counted)
-    assert table[["framing", "total", "answers"]].to_dict("split")["data"] == [["close-up", 8, 7], ["head-shot", 1, 2]]
+    assert table[["framing", "total", "answers"]].to_dict("split")["data"] == [
+        ["close-up", 8, 7],
+        ["head-shot", 1, 2],
+    ]
     assert table.mean_strength.tolist() == pytest.approx([8 / 7, 1 / 2])
 
 
 def test_sides_by_hand(counted):
-    assert sides(counted).to_dict("split")["data"] == [["close-up", 2, 2, 3], ["head-shot", 0, 1, 1]]
+    assert sides(counted).to_dict("split")["data"] == [
+        ["close-up", 2, 2, 3],
+        ["head-shot", 0, 1, 1],
+    ]
 
 
 def test_familiarity_counts_people(counted):
@@ -68,7 +85,8 @@ def test_preferences_of_a_pair_turn_with_the_pair(counted):
 
 
 def test_the_trend_is_the_least_squares_line():
-    # by hand: mean distance 2, mean total 190, slope (-1 * 50 + 1 * -60) / 2, residuals -5/3 10/3 -5/3 ... of 240 200 130
+    # by hand: mean distance 2, mean total 190, slope (-1 * 50 + 1 * -60) / 2, residuals -5/3 10/3
+    # -5/3 ... of 240 200 130
     line = trend(pd.DataFrame({"total": [240, 200, 130]}))
     assert (line.slope, line.intercept) == pytest.approx((-55.0, 300.0))
     assert line.r2 == pytest.approx(1 - 150 / 6200)
@@ -78,13 +96,18 @@ def test_the_trend_is_the_least_squares_line():
 
 def test_turning_the_sides_of_answers_changes_nothing_but_the_sides(write, random_study):
     rows = random_study(7, seed=1)
-    turned = [[*row[:3], row[4], row[3], -row[5], *row[6:]] if place % 3 else row for place, row in enumerate(rows)]
+    turned = [
+        [*row[:3], row[4], row[3], -row[5], *row[6:]] if place % 3 else row
+        for place, row in enumerate(rows)
+    ]
     techniques = sorted({row[3] for row in rows})
     before = read_responses(write(rows), order=techniques)
     after = read_responses(write(turned), order=techniques)
     for count in (scores, totals, distributions, familiarity):
         assert count(before).equals(count(after))
-    assert sides(before)["none"].equals(sides(after)["none"]) and not sides(before).equals(sides(after))
+    assert sides(before)["none"].equals(sides(after)["none"]) and not sides(before).equals(
+        sides(after)
+    )
 
 
 def test_new_names_permute_scores(write, random_study):
@@ -92,7 +115,11 @@ def test_new_names_permute_scores(write, random_study):
     names = dict(zip(sorted({row[3] for row in rows}), ["e", "d", "c", "b", "a"], strict=True))
     renamed = [[*row[:3], names[row[3]], names[row[4]], *row[5:]] for row in rows]
     before = scores(read_responses(write(rows), order=sorted(names)))
-    after = scores(read_responses(write(renamed), order=sorted(names.values()))).set_index(["framing", "technique"]).score
+    after = (
+        scores(read_responses(write(renamed), order=sorted(names.values())))
+        .set_index(["framing", "technique"])
+        .score
+    )
     assert all(after[row.framing, names[row.technique]] == row.score for row in before.itertuples())
 
 

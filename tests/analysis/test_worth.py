@@ -1,4 +1,6 @@
-"""Worths against published fits, against choix, statsmodels and plain optimisation; what must not change them; what has none."""
+"""Worths against published fits, against choix, statsmodels and plain optimisation; what must not
+change them; what has none.
+"""
 
 from dataclasses import replace
 from itertools import combinations
@@ -13,9 +15,18 @@ from statsmodels.miscmodels.ordinal_model import OrderedModel
 from analysis import worth
 from analysis.options import Options
 from analysis.panel import MISSING, panels, tied, wins
-from analysis.worth import JOD_SIGMA, bradley_terry, davidson, missing_fit, ordinal, thurstone_jod, worths
+from analysis.worth import (
+    JOD_SIGMA,
+    bradley_terry,
+    davidson,
+    missing_fit,
+    ordinal,
+    thurstone_jod,
+    worths,
+)
 
-#: Wins of row over column: American League East 1987, in Agresti, "Categorical Data Analysis", 2nd ed. 2002, table 10.10.
+#: Wins of row over column: American League East 1987, in Agresti, "Categorical Data Analysis", 2nd
+#: ed. 2002, table 10.10.
 BASEBALL = np.array(
     [
         [0, 7, 9, 7, 7, 9, 11],
@@ -27,9 +38,11 @@ BASEBALL = np.array(
         [2, 4, 1, 3, 1, 7, 0],
     ]
 )
-#: Chocolate puddings: brands i and j, preferences for i, for j, for neither; Davidson 1970, example 2, as in R's PlackettLuce.
-PUDDINGS = """1 2 19 22 16 | 1 3 16 19 12 | 2 3 19 19 10 | 1 4 18 23 13 | 2 4 23 19 9 | 3 4 19 20 15 | 1 5 13 19 18 | 2 5 16 20 12
-              3 5 16 15 17 | 4 5 17 14 16 | 1 6 18 21 12 | 2 6 22 20 12 | 3 6 13 18 10 | 4 6 14 19 18 | 5 6 11 21 12"""
+#: Chocolate puddings: brands i and j, preferences for i, for j, for neither; Davidson 1970, example
+#: 2, as in R's PlackettLuce.
+PUDDINGS = """1 2 19 22 16 | 1 3 16 19 12 | 2 3 19 19 10 | 1 4 18 23 13 | 2 4 23 19 9
+              3 4 19 20 15 | 1 5 13 19 18 | 2 5 16 20 12 | 3 5 16 15 17 | 4 5 17 14 16
+              1 6 18 21 12 | 2 6 22 20 12 | 3 6 13 18 10 | 4 6 14 19 18 | 5 6 11 21 12"""
 MODELS = ("bradley_terry", "davidson", "thurstone_jod", "ordinal")
 
 
@@ -48,7 +61,9 @@ def games(matrix):
 
 
 def test_bradley_terry_gives_agrestis_baseball():
-    """Published: Milwaukee 1.58, Detroit 1.44, Toronto 1.29, New York 1.25, Boston 1.11, Cleveland 0.68, Baltimore 0."""
+    """Published: Milwaukee 1.58, Detroit 1.44, Toronto 1.29, New York 1.25, Boston 1.11, Cleveland
+    0.68, Baltimore 0.
+    """
     found = bradley_terry(BASEBALL)
     assert found - found[-1] == pytest.approx([1.58, 1.44, 1.29, 1.25, 1.11, 0.68, 0], abs=0.005)
     assert found.sum() == pytest.approx(0, abs=1e-12)
@@ -57,7 +72,9 @@ def test_bradley_terry_gives_agrestis_baseball():
 @pytest.mark.parametrize("seed", range(4))
 def test_bradley_terry_is_that_of_choix(seed):
     rng = np.random.default_rng(seed)
-    matrix = rng.integers(1, 12, (3 + 2 * seed, 3 + 2 * seed)) * (1 - np.eye(3 + 2 * seed, dtype=int))
+    matrix = rng.integers(1, 12, (3 + 2 * seed, 3 + 2 * seed)) * (
+        1 - np.eye(3 + 2 * seed, dtype=int)
+    )
     expected = choix.opt_pairwise(len(matrix), games(matrix), alpha=0, tol=1e-12)
     assert bradley_terry(matrix) == pytest.approx(expected - expected.mean(), abs=1e-5)
 
@@ -66,16 +83,24 @@ def test_half_a_win_for_a_tie_is_two_games_for_a_win_and_one_each_for_a_tie(crow
     panel = crowd(30, [0, 0.5, 1], seed=2)
     half = wins(panel, panel.counts)
     expected = choix.opt_pairwise(3, games(2 * half), alpha=0, tol=1e-12)
-    assert worth.estimated(panel, "bradley_terry", Options()) == pytest.approx(expected - expected.mean(), abs=1e-5)
+    assert worth.estimated(panel, "bradley_terry", Options()) == pytest.approx(
+        expected - expected.mean(), abs=1e-5
+    )
     dropped = wins(panel, panel.counts, "drop")
-    assert worth.estimated(panel, "bradley_terry", Options(ties="drop")) == pytest.approx(bradley_terry(dropped))
+    assert worth.estimated(panel, "bradley_terry", Options(ties="drop")) == pytest.approx(
+        bradley_terry(dropped)
+    )
     assert not np.allclose(bradley_terry(dropped), bradley_terry(half), atol=1e-3)
 
 
 def test_thurstone_is_a_probit_regression_and_one_jod_is_75_percent():
     i, j = np.triu_indices(7, 1)
     x = (np.eye(7)[i] - np.eye(7)[j])[:, :-1]
-    fit = sm.GLM(np.column_stack([BASEBALL[i, j], BASEBALL[j, i]]), x, family=sm.families.Binomial(sm.families.links.Probit())).fit(tol=1e-12)
+    fit = sm.GLM(
+        np.column_stack([BASEBALL[i, j], BASEBALL[j, i]]),
+        x,
+        family=sm.families.Binomial(sm.families.links.Probit()),
+    ).fit(tol=1e-12)
     expected = np.append(fit.params, 0) * JOD_SIGMA
     assert thurstone_jod(BASEBALL) == pytest.approx(expected - expected.mean(), abs=1e-6)
     assert np.diff(thurstone_jod([[0, 25], [75, 0]])) == pytest.approx([1])
@@ -89,19 +114,28 @@ def test_davidson_maximises_its_likelihood_of_the_puddings():
         pi, nu = np.exp(np.append(0, theta[:5])), np.exp(theta[5])
         bottom = pi[i] + pi[j] + nu * np.sqrt(pi[i] * pi[j])
         return -(
-            won[i, j] * np.log(pi[i] / bottom) + won[j, i] * np.log(pi[j] / bottom) + level[i, j] * np.log(nu * np.sqrt(pi[i] * pi[j]) / bottom)
+            won[i, j] * np.log(pi[i] / bottom)
+            + won[j, i] * np.log(pi[j] / bottom)
+            + level[i, j] * np.log(nu * np.sqrt(pi[i] * pi[j]) / bottom)
         ).sum()
 
     best = optimize.minimize(loss, np.zeros(6), method="BFGS", options={"gtol": 1e-8}).x
     found, log_nu = davidson(won, level)
-    assert found - found[0] == pytest.approx(np.append(0, best[:5]), abs=1e-5) and log_nu == pytest.approx(best[5], abs=1e-5)
+    assert found - found[0] == pytest.approx(
+        np.append(0, best[:5]), abs=1e-5
+    ) and log_nu == pytest.approx(best[5], abs=1e-5)
 
 
 def test_davidson_orders_a_balanced_design_by_points_and_is_bradley_terry_without_ties(crowd):
-    """Davidson 1970: in a balanced experiment the order is that of two points for a win and one for a tie."""
+    """Davidson 1970: in a balanced experiment the order is that of two points for a win and one for
+    a tie.
+    """
     panel = crowd(40, [0, 0.3, 0.9, 0.5, 0.1], seed=5)
     won, level = wins(panel, panel.counts, "drop"), tied(panel, panel.counts)
-    ranks = [stats.rankdata(np.round(one, 6)) for one in (davidson(won, level)[0], (2 * won + level).sum(axis=1))]
+    ranks = [
+        stats.rankdata(np.round(one, 6))
+        for one in (davidson(won, level)[0], (2 * won + level).sum(axis=1))
+    ]
     assert np.array_equal(*ranks)
     found, log_nu = davidson(BASEBALL, np.zeros((7, 7)))
     assert found == pytest.approx(bradley_terry(BASEBALL)) and log_nu == -np.inf
@@ -117,20 +151,27 @@ def test_many_matrices_at_once_are_as_one_by_one():
         (thurstone_jod(won), thurstone_jod),
         (davidson(won, level)[0], None),
     ):
-        alone = [davidson(w, t)[0] if one is None else one(w) for w, t in zip(won, level, strict=True)]
+        alone = [
+            davidson(w, t)[0] if one is None else one(w) for w, t in zip(won, level, strict=True)
+        ]
         assert together == pytest.approx(np.array(alone), nan_ok=True, abs=1e-8)
         assert np.isnan(together).any(axis=1).sum() < 50
 
 
 def test_ordinal_without_people_is_an_ordered_logit_of_answers_seen_from_both_sides(crowd):
-    """Each answer twice, once mirrored, makes the thresholds of statsmodels' model symmetric and the side effect 0."""
+    """Each answer twice, once mirrored, makes the thresholds of statsmodels' model symmetric and
+    the side effect 0.
+    """
     panel = crowd(60, [-0.8, 0.1, 0.3, 0.9], seed=3)
     x = np.eye(4)[panel.second] - np.eye(4)[panel.first]
     x = np.broadcast_to(x, (60, *x.shape)).reshape(-1, 4)[:, 1:]
     y = panel.preference.ravel().astype(int)
-    fit = OrderedModel(np.concatenate([y, -y]), np.concatenate([x, -x]), distr="logit").fit(method="bfgs", gtol=1e-8, disp=False, maxiter=500)
+    fit = OrderedModel(np.concatenate([y, -y]), np.concatenate([x, -x]), distr="logit").fit(
+        method="bfgs", gtol=1e-8, disp=False, maxiter=500
+    )
     expected = np.append(0, fit.params[:3])
-    # a side that is 0 by construction: every answer also with first and second shown the other way round
+    # a side that is 0 by construction: every answer also with first and second shown the other way
+    # round
     both = replace(
         panel,
         participants=np.concatenate([panel.participants, [f"Q{k}" for k in range(60)]]),
@@ -155,44 +196,66 @@ def _centred_errors(fit, n):
 
 def test_the_gradient_of_the_ordinal_likelihood_is_its_derivative(crowd):
     panel = crowd(25, [-1, 0, 0.2, 0.8], seed=7, taste=0.8, leaning=0.4, side=0.3)
-    answered = np.where(np.random.default_rng(0).random(panel.preference.shape) < 0.2, MISSING, panel.preference).astype(np.int8)
+    answered = np.where(
+        np.random.default_rng(0).random(panel.preference.shape) < 0.2, MISSING, panel.preference
+    ).astype(np.int8)
     likelihood = worth._Likelihood(replace(panel, preference=answered), mixed=True)
     theta = np.random.default_rng(1).normal(0, 0.4, len(likelihood.start()))
     _, slope = likelihood(theta)
     step = 1e-5
-    numeric = [(likelihood(theta + step * e)[0] - likelihood(theta - step * e)[0]) / (2 * step) for e in np.eye(len(theta))]
+    numeric = [
+        (likelihood(theta + step * e)[0] - likelihood(theta - step * e)[0]) / (2 * step)
+        for e in np.eye(len(theta))
+    ]
     assert slope == pytest.approx(numeric, abs=1e-8)
 
 
 def test_laplace_is_near_the_integral(crowd):
-    """Three techniques: a taste of two dimensions and a leaning, by 30 x 30 x 30 Gauss-Hermite points."""
+    """Three techniques: a taste of two dimensions and a leaning, by 30 x 30 x 30 Gauss-Hermite
+    points.
+    """
     panel = crowd(15, [-0.5, 0, 0.7], seed=9, taste=0.7, leaning=0.4)
     likelihood = worth._Likelihood(panel, mixed=True)
     theta = np.array([0.4, -0.6, 0.1, np.log(0.6), np.log(1.4), 0.7, 0.4])
     node, weight = np.polynomial.hermite_e.hermegauss(30)
     grid = np.stack(np.meshgrid(node, node, node, indexing="ij"), axis=-1).reshape(-1, 3)
-    mass = np.prod(np.stack(np.meshgrid(weight, weight, weight, indexing="ij"), axis=-1).reshape(-1, 3), axis=1) / (2 * np.pi) ** 1.5
+    mass = (
+        np.prod(
+            np.stack(np.meshgrid(weight, weight, weight, indexing="ij"), axis=-1).reshape(-1, 3),
+            axis=1,
+        )
+        / (2 * np.pi) ** 1.5
+    )
     tau = np.array([-np.inf, -2.0, -0.6, 0.6, 2.0, np.inf])
     total = 0.0
     for person in range(15):
         sign = np.where(panel.first_left[person], 1, -1)
         eta = (theta[:2] + 0.7 * grid[:, :2]) @ likelihood.x.T + sign * (0.1 + 0.4 * grid[:, 2:])
         y = panel.preference[person] + 2
-        total += np.log(mass @ np.prod(special.expit(tau[y + 1] - eta) - special.expit(tau[y] - eta), axis=1))
+        total += np.log(
+            mass @ np.prod(special.expit(tau[y + 1] - eta) - special.expit(tau[y] - eta), axis=1)
+        )
     laplace = -likelihood(theta)[0] * likelihood.answers
     assert laplace == pytest.approx(total, rel=5e-3) and laplace != pytest.approx(total, rel=1e-5)
     quadrature = worth._Quadrature(likelihood, theta)
     assert -quadrature(theta)[0] * likelihood.answers == pytest.approx(total, rel=1e-5)
     away, step = theta + 0.05, 1e-5
-    numeric = [(quadrature(away + step * e)[0] - quadrature(away - step * e)[0]) / (2 * step) for e in np.eye(len(theta))]
+    numeric = [
+        (quadrature(away + step * e)[0] - quadrature(away - step * e)[0]) / (2 * step)
+        for e in np.eye(len(theta))
+    ]
     assert quadrature(away)[1] == pytest.approx(numeric, abs=1e-8)
 
 
 def test_three_techniques_with_strong_tastes_are_recovered(crowd):
-    """Laplace's approximation makes these worths 15 % small; quadrature does not (three answers a person, spreads 1 and 0.6)."""
+    """Laplace's approximation makes these worths 15 % small; quadrature does not (three answers a
+    person, spreads 1 and 0.6).
+    """
     fit = ordinal(crowd(300, [-0.6, 0, 0.6], seed=3, taste=1.0, leaning=0.6, side=0.3))
     assert np.abs(fit.worth - [-0.6, 0, 0.6]).max() < 2.5 * fit.errors.max()
-    assert fit.sd_preference == pytest.approx(1.0, abs=0.35) and fit.side == pytest.approx(0.3, abs=3 * fit.side_error)
+    assert fit.sd_preference == pytest.approx(1.0, abs=0.35) and fit.side == pytest.approx(
+        0.3, abs=3 * fit.side_error
+    )
 
 
 def test_people_with_tastes_are_found_and_widen_the_interval(crowd):
@@ -207,9 +270,15 @@ def test_people_with_tastes_are_found_and_widen_the_interval(crowd):
 def test_one_answer_a_person_has_no_taste_and_six_have_a_caveat(crowd, table):
     notes = worths(table(crowd(40, [0, 0.5], seed=1)), Options(resamples=100)).attrs["notes"]
     assert any("at most 1 answers a participant" in note for note in notes)
-    notes = worths(table(crowd(80, [0, 0.5, 0.2, 0.1], seed=1, taste=2.0)), Options(resamples=100)).attrs["notes"]
-    assert any("Laplace's approximation makes worths a few per cent small" in note for note in notes)
-    notes = worths(table(crowd(40, [0, 0.5, 0.2, 0.1, -0.3], seed=1, taste=0.5)), Options(resamples=100)).attrs["notes"]
+    notes = worths(
+        table(crowd(80, [0, 0.5, 0.2, 0.1], seed=1, taste=2.0)), Options(resamples=100)
+    ).attrs["notes"]
+    assert any(
+        "Laplace's approximation makes worths a few per cent small" in note for note in notes
+    )
+    notes = worths(
+        table(crowd(40, [0, 0.5, 0.2, 0.1, -0.3], seed=1, taste=0.5)), Options(resamples=100)
+    ).attrs["notes"]
     assert not notes
 
 
@@ -226,7 +295,10 @@ def test_one_answer_a_person_has_no_taste_and_six_have_a_caveat(crowd, table):
 def test_ordinal_has_the_thresholds_of_the_answers_in_use(crowd, strengths, names):
     panel = crowd(60, [-0.5, 0, 0.5], seed=1)
     kept = np.isin(np.abs(panel.preference), list(strengths))
-    fit = ordinal(replace(panel, preference=np.where(kept, panel.preference, MISSING).astype(np.int8)), mixed=False)
+    fit = ordinal(
+        replace(panel, preference=np.where(kept, panel.preference, MISSING).astype(np.int8)),
+        mixed=False,
+    )
     assert fit.threshold_names == names and fit.answers == kept.sum()
     assert (np.diff(fit.worth) > 0).all()
     if strengths == {1}:  # then it is Bradley-Terry but for the side effect
@@ -234,7 +306,8 @@ def test_ordinal_has_the_thresholds_of_the_answers_in_use(crowd, strengths, name
         assert set(sign) == {-1, 1}
 
 
-# --- what must not change ----------------------------------------------------------------------------------------------------------
+# --- what must not change
+# -----------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -242,8 +315,10 @@ def study(crowd):
     return crowd(24, [-0.7, 0, 0.3, 0.9], seed=8, taste=0.4, side=0.3)
 
 
-def estimates(responses, options=Options(resamples=100)):
-    return worths(responses, options).set_index(["framing", "model", "technique"])[["estimate", "low", "high"]]
+def estimates(responses, options=None):
+    return worths(responses, options or Options(resamples=100)).set_index(
+        ["framing", "model", "technique"]
+    )[["estimate", "low", "high"]]
 
 
 def test_worths_have_their_columns_and_centre_on_0_within_a_framing(study, table):
@@ -273,21 +348,27 @@ def test_doubling_the_people_keeps_worths_and_narrows_intervals(study, table):
     one, other = (estimates(table(panel), Options(resamples=400)) for panel in (study, twice))
     np.testing.assert_allclose(one.estimate, other.estimate, atol=1e-5)
     ratio = (other.high - other.low) / (one.high - one.low)
-    assert ratio.between(0.55, 0.85).all() and ratio.mean() == pytest.approx(1 / np.sqrt(2), abs=0.06)
+    assert ratio.between(0.55, 0.85).all() and ratio.mean() == pytest.approx(
+        1 / np.sqrt(2), abs=0.06
+    )
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_a_known_truth_is_in_its_interval_as_often_as_claimed(crowd, model):
-    """60 small studies of 30 people: of 180 95 % intervals at least 160 hold (binomial: fewer has a chance below 1e-4)."""
+    """60 small studies of 30 people: of 180 95 % intervals at least 160 hold (binomial: fewer has a
+    chance below 1e-4).
+    """
     truth, options, hits, count = np.array([-0.5, 0.1, 0.4]), Options(resamples=200), 0, 60
-    noise, scale = {"thurstone_jod": ("standard_normal", 1 / JOD_SIGMA)}.get(model, ("logistic", 1.0))
+    noise, scale = {"thurstone_jod": ("standard_normal", 1 / JOD_SIGMA)}.get(
+        model, ("logistic", 1.0)
+    )
     for seed in range(count):
         if model == "davidson":
             panel = _davidson_people(crowd, truth, seed)
         else:
             cuts = (0.6, 2.0) if model == "ordinal" else (0.0, 2.0)
             panel = crowd(30, truth * scale, seed=seed, noise=noise, cuts=cuts)
-        estimate, low, high, said = worth._worth(panel, model, options)
+        _estimate, low, high, said = worth._worth(panel, model, options)
         assert not any("no finite" in note for note in said)
         hits += ((low <= truth) & (truth <= high)).sum()
     assert 160 <= hits <= 180
@@ -302,14 +383,16 @@ def _davidson_people(crowd, truth, seed):
     return replace(panel, preference=drawn.astype(np.int8))
 
 
-# --- what has no worth -------------------------------------------------------------------------------------------------------------
+# --- what has no worth
+# -----------------------------------------------------------------------------
 
 REFUSED = {
     "a was never beaten by b, c": ["a>b a>c b>c"] * 3 + ["a>>b a>c b<c"] * 3,
     "c was never preferred to a, b": ["a>c b>c a>b"] * 3 + ["a>c b>c a<b"] * 3,
     "a, b and c, d were never compared": ["a>b c>d"] * 3 + ["a<b c<d"] * 3,
     "every answer is 'no difference'": ["a=b b=c a=c"] * 6,
-    "a, b were never beaten by c, d": ["a>b a>c b>d c>d a>d b>c"] * 3 + ["a<b a>c b>d c<d a>d b>c"] * 3,
+    "a, b were never beaten by c, d": ["a>b a>c b>d c>d a>d b>c"] * 3
+    + ["a<b a>c b>d c<d a>d b>c"] * 3,
 }
 
 
@@ -317,15 +400,27 @@ REFUSED = {
 def test_a_fit_that_does_not_exist_is_named_and_not_invented(lines, reason):
     responses = lines(*REFUSED[reason])
     found = worths(responses, Options(resamples=100))
-    assert found[["estimate", "low", "high"]].isna().all(axis=None) and len(found) == 4 * len(responses.items["close-up"])
-    assert all(any(f"close-up, {model}: no finite worths: {reason}" in note for note in found.attrs["notes"]) for model in MODELS)
+    assert found[["estimate", "low", "high"]].isna().all(axis=None) and len(found) == 4 * len(
+        responses.items["close-up"]
+    )
+    assert all(
+        any(
+            f"close-up, {model}: no finite worths: {reason}" in note
+            for note in found.attrs["notes"]
+        )
+        for model in MODELS
+    )
     assert worth.parameters(responses, Options(resamples=100)).empty
 
 
 def test_tied_but_never_beaten_has_no_bradley_terry_but_may_have_a_davidson(lines):
     responses = lines(*["a=b b>c a>c"] * 4, *["a>b b<c a=c"] * 4, *["a=b b=c a=c"] * 4)
     (panel,) = panels(responses).values()
-    assert missing_fit(panel, "bradley_terry") == missing_fit(panel, "thurstone_jod") == "a was never beaten by b, c"
+    assert (
+        missing_fit(panel, "bradley_terry")
+        == missing_fit(panel, "thurstone_jod")
+        == "a was never beaten by b, c"
+    )
     assert missing_fit(panel, "davidson") is None and missing_fit(panel, "ordinal") is None
     found = worths(responses, Options(resamples=100)).set_index(["model", "technique"]).estimate
     assert np.isnan(found["bradley_terry", "a"]) and found["davidson", "a"] > found["davidson", "b"]
@@ -342,17 +437,27 @@ def test_separated_answers_are_refused(lines):
 
 
 def test_tastes_that_grow_without_end_are_refused(crowd, table):
-    """Twenty people with strong tastes, three answers each: among 40 such studies one at least has no maximum."""
+    """Twenty people with strong tastes, three answers each: among 40 such studies one at least has
+    no maximum.
+    """
     found = next(
         worths(table(other), Options(resamples=100, models=("ordinal",)))
-        for other in (crowd(20, [-1, -2, 2], seed=seed, taste=6.0, cuts=(2.0, 4.0)) for seed in range(40))
+        for other in (
+            crowd(20, [-1, -2, 2], seed=seed, taste=6.0, cuts=(2.0, 4.0)) for seed in range(40)
+        )
         if ordinal(other) is None and missing_fit(other, "ordinal") is None
     )
-    assert found.estimate.isna().all() and "can grow together without end" in found.attrs["notes"][0]
+    assert (
+        found.estimate.isna().all() and "can grow together without end" in found.attrs["notes"][0]
+    )
 
 
 def test_two_techniques_have_the_log_odds(lines):
-    found = worths(lines(*["a>b"] * 12, *["a<<b"] * 4), Options(resamples=100)).set_index(["model", "technique"]).estimate
+    found = (
+        worths(lines(*["a>b"] * 12, *["a<<b"] * 4), Options(resamples=100))
+        .set_index(["model", "technique"])
+        .estimate
+    )
     assert found["bradley_terry", "a"] - found["bradley_terry", "b"] == pytest.approx(np.log(3))
     assert found["davidson", "a"] - found["davidson", "b"] == pytest.approx(np.log(3))
     assert found["thurstone_jod", "a"] - found["thurstone_jod", "b"] == pytest.approx(1)
@@ -371,7 +476,10 @@ def test_resamples_without_a_fit_are_counted(lines):
     responses = lines(*["a>b b>c a>c"] * 2, *["a>b b<c a>c"] * 3, "a<b b<c a<c")
     found = worths(responses, Options(resamples=200, models=("bradley_terry",)))
     assert found.estimate.notna().all() and found[["low", "high"]].isna().all(axis=None)
-    assert any("resamples have no finite worths; too many for an interval" in note for note in found.attrs["notes"])
+    assert any(
+        "resamples have no finite worths; too many for an interval" in note
+        for note in found.attrs["notes"]
+    )
 
 
 def test_eleven_techniques(crowd, table):
@@ -388,4 +496,6 @@ def test_strong_connection_is_a_chain_of_wins_between_any_two():
 
 
 def test_jod_sigma_is_the_textbooks():
-    assert JOD_SIGMA == pytest.approx(1.4826, abs=1e-4) and stats.norm.cdf(1 / JOD_SIGMA) == pytest.approx(0.75)
+    assert pytest.approx(1.4826, abs=1e-4) == JOD_SIGMA and stats.norm.cdf(
+        1 / JOD_SIGMA
+    ) == pytest.approx(0.75)

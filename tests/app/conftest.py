@@ -1,4 +1,6 @@
-"""A study of ready-made images, its application, and people who use it as a browser without scripts does."""
+"""A study of ready-made images, its application, and people who use it as a browser without scripts
+does.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_g
 
 @pytest.fixture
 def write_study():
-    """Write a study folder by hand, no renderer: 15 small PNGs and their manifest; `changes` replace keys of the study."""
+    """Write a study folder by hand, no renderer: 15 small PNGs and their manifest; `changes`
+    replace keys of the study.
+    """
 
     def write(directory: Path, size: tuple[int, int] = (64, 36), **changes) -> Path:
         (directory / "images").mkdir(parents=True)
@@ -30,7 +34,9 @@ def write_study():
             for t, technique in enumerate(TECHNIQUES):
                 file = f"images/{framing}_{technique}.png"
                 colour = (60 + 40 * t, 90, 60 + 60 * f)
-                Image.fromarray(np.full((size[1], size[0], 3), colour, np.uint8)).save(directory / file)
+                Image.fromarray(np.full((size[1], size[0], 3), colour, np.uint8)).save(
+                    directory / file
+                )
                 digest = hashlib.sha256((directory / file).read_bytes()).hexdigest()
                 image = {"framing": framing, "technique": technique, "file": file, "sha256": digest}
                 images.append(image | {"width": size[0], "height": size[1]})
@@ -93,7 +99,9 @@ class Person:
         return self.page
 
     def form(self, field: str) -> dict[str, str]:
-        """The fields of the form on the page that has `field`, as a browser would send them before anything is chosen."""
+        """The fields of the form on the page that has `field`, as a browser would send them before
+        anything is chosen.
+        """
         return self._form(field).fields
 
     def send(self, field: str, **filled):
@@ -124,7 +132,12 @@ class Person:
         with self.http.session_transaction() as session:
             visit = session["visit"]
         with self.app.extensions["database"].read() as db:
-            query = select(Response).join(Participant).where(Participant.visit == visit).order_by(Response.id)
+            query = (
+                select(Response)
+                .join(Participant)
+                .where(Participant.visit == visit)
+                .order_by(Response.id)
+            )
             return list(db.scalars(query))
 
     @property

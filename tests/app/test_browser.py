@@ -1,4 +1,6 @@
-"""The questionnaire in Chromium, as people use it: keys, mouse, reload, a lost connection, windows of every size."""
+"""The questionnaire in Chromium, as people use it: keys, mouse, reload, a lost connection, windows
+of every size.
+"""
 
 import re
 import shutil
@@ -12,15 +14,25 @@ from app.models import Response, Trial
 from app.server import running
 
 FLAGS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
 ]
 KEY_OF = {-2: "1", -1: "2", 0: "3", 1: "4", 2: "5"}
 
 
 @pytest.fixture(scope="module")
 def chromium():
-    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    path = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     assert path, "Chromium is missing; `make setup` installs it"
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
@@ -46,10 +58,17 @@ def page(chromium):
         page = context.new_page()
         page.set_default_timeout(20_000)
         complaints = []
-        page.on("console", lambda message: message.type in ("error", "warning") and complaints.append(message.text))
+        page.on(
+            "console",
+            lambda message: (
+                message.type in ("error", "warning") and complaints.append(message.text)
+            ),
+        )
         page.on("pageerror", lambda error: complaints.append(str(error)))
         yield page
-        assert [text for text in complaints if "Failed to load resource: net::" not in text] == []  # those that a test cuts
+        assert [
+            text for text in complaints if "Failed to load resource: net::" not in text
+        ] == []  # those that a test cuts
 
 
 def begin(page, address):
@@ -72,7 +91,9 @@ def stored(app):
         return db.execute(select(Trial, Response).join(Response).order_by(Response.id)).all()
 
 
-def test_all_thirty_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_connection(page, address, app):
+def test_all_thirty_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_connection(
+    page, address, app
+):
     answers = [(7 * i) % 5 - 2 for i in range(30)]
     begin(page, address)
     for number, answer in enumerate(answers, start=1):
@@ -96,8 +117,12 @@ def test_all_thirty_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_conne
     assert [trial.order for trial, _ in rows] == list(range(1, 31))
     assert [response.answer for _, response in rows] == answers
     assert {response.timed_by for _, response in rows} == {"browser"}
-    assert {(r.viewport_width, r.viewport_height, r.device_pixel_ratio) for _, r in rows} == {(1280, 720, 1.0)}
-    assert all(abs(r.shown_width / r.shown_height - 16 / 9) < 0.01 and r.shown_width > 600 for _, r in rows)
+    assert {(r.viewport_width, r.viewport_height, r.device_pixel_ratio) for _, r in rows} == {
+        (1280, 720, 1.0)
+    }
+    assert all(
+        abs(r.shown_width / r.shown_height - 16 / 9) < 0.01 and r.shown_width > 600 for _, r in rows
+    )
     assert [trial.order for trial, r in rows if r.times_shown > 1] == [12]
     assert page.evaluate("Object.keys(localStorage)") == []
 
@@ -114,7 +139,9 @@ def lose_connection_while_answering(page, answer):
     shown(page, 21)
 
 
-def test_a_page_closed_without_a_connection_sends_its_answer_when_it_is_opened_again(page, address, app):
+def test_a_page_closed_without_a_connection_sends_its_answer_when_it_is_opened_again(
+    page, address, app
+):
     begin(page, address)
     page.context.set_offline(True)
     page.keyboard.press("5")
@@ -171,7 +198,10 @@ def test_arrows_and_focus(page, address):
     page.keyboard.press("ArrowRight")
     expect(page.get_by_label("B, slightly")).to_be_checked()
     expect(page.get_by_label("B, slightly")).to_be_focused()
-    assert page.evaluate("getComputedStyle(document.activeElement.closest('label')).outlineWidth") == "3px"
+    assert (
+        page.evaluate("getComputedStyle(document.activeElement.closest('label')).outlineWidth")
+        == "3px"
+    )
     assert page.get_by_role("group", name="Which image looks more realistic?").count() == 1
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("ArrowLeft")
@@ -188,12 +218,16 @@ def test_nothing_can_be_answered_before_both_images_are_there(page, address, app
     page.click("text=Continue")
     page.wait_for_selector("html.ready fieldset:disabled")
     page.wait_for_timeout(500)
-    assert page.evaluate("[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)") == ["0", "0"]
+    assert page.evaluate(
+        "[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)"
+    ) == ["0", "0"]
     page.keyboard.press("5")
     page.keyboard.press("Enter")
     held[0].continue_()
     shown(page, 1)
-    assert page.evaluate("[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)") == ["1", "1"]
+    assert page.evaluate(
+        "[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)"
+    ) == ["1", "1"]
     assert page.locator("input[name=answer]:checked").count() == 0 and stored(app) == []
 
 
@@ -204,16 +238,22 @@ def test_the_next_images_are_there_before_they_are_asked_for(page, address):
     page.keyboard.press("3")
     page.keyboard.press("Enter")
     shown(page, 2)
-    images = page.evaluate("[...document.querySelectorAll('.pair img')].map((i) => i.getAttribute('src'))")
+    images = page.evaluate(
+        "[...document.querySelectorAll('.pair img')].map((i) => i.getAttribute('src'))"
+    )
     assert images == upcoming
-    loaded = page.evaluate("performance.getEntriesByType('resource').map((e) => [e.name, e.transferSize])")
+    loaded = page.evaluate(
+        "performance.getEntriesByType('resource').map((e) => [e.name, e.transferSize])"
+    )
     fetched = [name for name, size in loaded if "/images/" in name and size]
     assert len(fetched) >= 4
     assert len(fetched) == len(set(fetched))  # no image came over the network twice
 
 
 def test_without_scripts_the_whole_questionnaire_works(chromium, address, app):
-    with chromium.new_context(java_script_enabled=False, viewport={"width": 1280, "height": 720}) as context:
+    with chromium.new_context(
+        java_script_enabled=False, viewport={"width": 1280, "height": 720}
+    ) as context:
         page = context.new_page()
         page.goto(address)
         page.check("[name=consent]")
@@ -254,7 +294,9 @@ def test_images_are_as_large_as_the_window_allows(page, address, width, height, 
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert page.evaluate("document.documentElement.scrollHeight <= innerHeight + 1")
     for label in page.locator(".options label").all():
-        assert label.evaluate("(l) => l.scrollWidth <= l.clientWidth && l.getBoundingClientRect().height >= 40")
+        assert label.evaluate(
+            "(l) => l.scrollWidth <= l.clientWidth && l.getBoundingClientRect().height >= 40"
+        )
 
 
 def test_the_dashboard_refreshes_by_itself(page, address, app):

@@ -29,9 +29,16 @@ def test_the_export_has_one_row_for_each_answer(person, experimenter, app):
     assert len(rows) == 32 == int(response.headers["X-Row-Count"])
     with app.extensions["database"].read() as db:
         columns = (Trial.framing, Trial.left, Trial.right, Trial.order, Response.answer)
-        expected = db.execute(select(*columns).join(Response).order_by(Trial.participant_id, Trial.order)).all()
-    assert [(r["framing"], r["left"], r["right"], int(r["order"]), int(r["answer"])) for r in rows] == [tuple(row) for row in expected]
-    assert [(r["participant"], r["familiarity"], r["completed"], r["simulated"]) for r in (rows[0], rows[-1])] == [
+        expected = db.execute(
+            select(*columns).join(Response).order_by(Trial.participant_id, Trial.order)
+        ).all()
+    assert [
+        (r["framing"], r["left"], r["right"], int(r["order"]), int(r["answer"])) for r in rows
+    ] == [tuple(row) for row in expected]
+    assert [
+        (r["participant"], r["familiarity"], r["completed"], r["simulated"])
+        for r in (rows[0], rows[-1])
+    ] == [
         ("P0001", "5", "1", "0"),
         ("P0002", "1", "0", "0"),
     ]
@@ -57,7 +64,9 @@ def test_withdrawn_answers_are_not_exported_nor_counted(person, experimenter):
     person().begin().answer(1, 1, 1)
     leaver = person().begin().answer(2, 2)
     withdraw(leaver)
-    assert {row["participant"] for row in table(experimenter.get("/dashboard/responses.csv"))} == {"P0001"}
+    assert {row["participant"] for row in table(experimenter.get("/dashboard/responses.csv"))} == {
+        "P0001"
+    }
     live = experimenter.get("/dashboard/live.json").json
     assert live["summary"]["answers"] == 3 and live["summary"]["withdrawn"] == 1
     assert sum(framing["answers"] for framing in live["framings"]) == 3
@@ -72,20 +81,34 @@ def test_the_codebook_describes_exactly_the_columns(person, experimenter):
     assert [row["column"] for row in codebook] == columns
     assert all(row["description"] and row["type"] for row in codebook)
     text = experimenter.get("/dashboard/codebook.md").text
-    for word in (*(f"| `{column}` |" for column in columns), "by golubev_plus", "at half-length", "A, clearly", "No familiarity"):
+    for word in (
+        *(f"| `{column}` |" for column in columns),
+        "by golubev_plus",
+        "at half-length",
+        "A, clearly",
+        "No familiarity",
+    ):
         assert word in text
 
 
 def test_an_empty_study_has_an_empty_table_and_a_calm_dashboard(experimenter):
     response = experimenter.get("/dashboard/responses.csv")
-    assert table(response) == [] and response.text.startswith("participant,") and response.headers["X-Row-Count"] == "0"
+    assert (
+        table(response) == []
+        and response.text.startswith("participant,")
+        and response.headers["X-Row-Count"] == "0"
+    )
     assert "No answers yet" in experimenter.get("/dashboard/").text
 
 
 def test_live_numbers_follow_the_answers(person, experimenter, app):
     somebody = person().begin()
     before = experimenter.get("/dashboard/live.json").json
-    assert (before["summary"]["started"], before["summary"]["answers"], before["framings"]) == (1, 0, [])
+    assert (before["summary"]["started"], before["summary"]["answers"], before["framings"]) == (
+        1,
+        0,
+        [],
+    )
     somebody.answer(2)
     after = experimenter.get("/dashboard/live.json").json
     with app.extensions["database"].read() as db:
@@ -112,15 +135,25 @@ def test_states_of_participants(person, experimenter, app):
         for row in db.scalars(select(Response).where(Response.participant_id == 4)):
             row.answered_at -= timedelta(hours=1)
     live = experimenter.get("/dashboard/live.json").json
-    assert [p["state"] for p in live["participants"]] == ["dropped out", "withdrawn", "in progress", "completed"]
+    assert [p["state"] for p in live["participants"]] == [
+        "dropped out",
+        "withdrawn",
+        "in progress",
+        "completed",
+    ]
 
 
 def test_the_report_is_served_behind_the_login_with_its_own_policy(person, experimenter, study_dir):
     assert experimenter.get("/dashboard/report/").status_code == 404
     (study_dir / "report").mkdir()
-    (study_dir / "report" / "report.html").write_text("<title>Report</title><style>p { color: red }</style>")
+    (study_dir / "report" / "report.html").write_text(
+        "<title>Report</title><style>p { color: red }</style>"
+    )
     response = experimenter.get("/dashboard/report/")
-    assert "<title>Report" in response.text and "style-src 'unsafe-inline'" in response.headers["Content-Security-Policy"]
+    assert (
+        "<title>Report" in response.text
+        and "style-src 'unsafe-inline'" in response.headers["Content-Security-Policy"]
+    )
     assert "script-src" not in response.headers["Content-Security-Policy"]
     assert 'href="/dashboard/report/"' in experimenter.get("/dashboard/").text
     assert experimenter.get("/dashboard/report/../../study.sqlite3").status_code == 404
@@ -135,7 +168,10 @@ def test_answers_about_images_that_were_rendered_anew_are_pointed_out(person, ex
     with app.extensions["database"].write() as db:
         db.get(Response, 2).image_right_sha256 = "0" * 64
     live = experimenter.get("/dashboard/live.json").json
-    assert live["summary"]["about_other_images"] == 1 and "1 of these answers are about images" in live["html"]
+    assert (
+        live["summary"]["about_other_images"] == 1
+        and "1 of these answers are about images" in live["html"]
+    )
 
 
 def test_the_dashboard_links_every_image_by_its_hash(experimenter, app):

@@ -35,8 +35,16 @@ def test_constraints_are_those_of_the_models(app):
 
 def test_sqlite_is_set_to_keep_what_it_commits(app):
     with app.extensions["database"].read() as db:
-        pragmas = {name: db.execute(text(f"PRAGMA {name}")).scalar() for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")}
-    assert pragmas == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1, "busy_timeout": 30_000}
+        pragmas = {
+            name: db.execute(text(f"PRAGMA {name}")).scalar()
+            for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
+        }
+    assert pragmas == {
+        "journal_mode": "wal",
+        "synchronous": 2,
+        "foreign_keys": 1,
+        "busy_timeout": 30_000,
+    }
 
 
 def test_starting_again_keeps_everything(study_dir, person, app):
@@ -65,7 +73,9 @@ def test_a_number_is_never_given_twice(app):
     with database.write() as db:
         db.add_all([Participant(visit="a"), Participant(visit="b")])
     with database.write() as db:
-        db.execute(text("DELETE FROM participants WHERE visit = 'b'"))  # nothing in the application does this
+        db.execute(
+            text("DELETE FROM participants WHERE visit = 'b'")
+        )  # nothing in the application does this
     with database.write() as db:
         db.add(third := Participant(visit="c"))
         db.flush()
@@ -83,7 +93,9 @@ def test_real_and_simulated_never_mix(study_dir):
     create_app(study_dir)
     create_app(study_dir, simulated=True)
     for file, simulated in (("study.sqlite3", True), ("simulated.sqlite3", False)):
-        with pytest.raises(InputError, match="kind is '(real|simulated)', expected '(real|simulated)'"):
+        with pytest.raises(
+            InputError, match="kind is '(real|simulated)', expected '(real|simulated)'"
+        ):
             create_app(study_dir, f"sqlite:///{study_dir / file}", simulated=simulated)
 
 

@@ -27,9 +27,14 @@ def test_trials_are_those_of_the_design_and_recorded(app, person):
     study = app.extensions["study"]
     with app.extensions["database"].read() as db:
         for number in (1, 2):
-            recorded = db.scalars(select(Trial).where(Trial.participant_id == number).order_by(Trial.order)).all()
+            recorded = db.scalars(
+                select(Trial).where(Trial.participant_id == number).order_by(Trial.order)
+            ).all()
             expected = trials(study.framings, study.techniques, study.seed, number)
-            lists = [[(t.order, t.framing, t.left, t.right) for t in some] for some in (recorded, expected)]
+            lists = [
+                [(t.order, t.framing, t.left, t.right) for t in some]
+                for some in (recorded, expected)
+            ]
             assert lists[0] == lists[1]
             assert {t.seed for t in recorded} == {f"7/{number}"}
 
@@ -44,7 +49,13 @@ def test_the_page_does_not_tell_which_technique_is_shown(app, person):
 
 def test_what_the_browser_measured_is_recorded(person):
     somebody = person().begin()
-    measured = {"viewport_width": 1280, "viewport_height": 720, "device_pixel_ratio": 1.25, "shown_width": 630.5, "shown_height": 354.66}
+    measured = {
+        "viewport_width": 1280,
+        "viewport_height": 720,
+        "device_pixel_ratio": 1.25,
+        "shown_width": 630.5,
+        "shown_height": 354.66,
+    }
     somebody.send("trial", answer=1, rt_ms=4321, **measured)
     row = somebody.rows[0]
     assert (row.rt_ms, row.timed_by, row.times_shown) == (4321, "browser", 1)
@@ -62,9 +73,22 @@ def test_without_scripts_the_server_takes_the_time(person):
 @pytest.mark.parametrize("nonsense", ["", "-1", "1e400", "nan", "inf", "9" * 40, "<b>"])
 def test_a_nonsense_measurement_never_costs_the_answer(person, nonsense):
     somebody = person().begin()
-    somebody.send("trial", answer=-1, rt_ms=nonsense, viewport_width=nonsense, device_pixel_ratio=nonsense, shown_width=nonsense)
+    somebody.send(
+        "trial",
+        answer=-1,
+        rt_ms=nonsense,
+        viewport_width=nonsense,
+        device_pixel_ratio=nonsense,
+        shown_width=nonsense,
+    )
     row = somebody.rows[0]
-    assert (row.answer, row.timed_by, row.viewport_width, row.device_pixel_ratio, row.shown_width) == (-1, "server", None, None, None)
+    assert (
+        row.answer,
+        row.timed_by,
+        row.viewport_width,
+        row.device_pixel_ratio,
+        row.shown_width,
+    ) == (-1, "server", None, None, None)
 
 
 def test_reload_resumes_where_it_was(person):
@@ -103,12 +127,18 @@ def test_going_back_cannot_change_an_answer(app, person):
     somebody = person().begin()
     first = somebody.form("trial")
     somebody.answer(2)
-    somebody.page = somebody.http.post("/question", data=first | {"answer": "-2"}, follow_redirects=True)
+    somebody.page = somebody.http.post(
+        "/question", data=first | {"answer": "-2"}, follow_redirects=True
+    )
     assert somebody.answers == [2] and "the first answer was kept" in somebody.page.text
-    reply = somebody.http.post("/question", data=first | {"answer": "-1"}, headers={"Accept": "application/json"})
+    reply = somebody.http.post(
+        "/question", data=first | {"answer": "-1"}, headers={"Accept": "application/json"}
+    )
     assert (reply.status_code, reply.json["outcome"]) == (409, "refused")
     with app.extensions["database"].read() as db:
-        details = db.scalars(select(Event.detail).where(Event.kind == "refused").order_by(Event.id)).all()
+        details = db.scalars(
+            select(Event.detail).where(Event.kind == "refused").order_by(Event.id)
+        ).all()
     assert details == ["kept 2, refused -2", "kept 2, refused -1"]
 
 
@@ -116,9 +146,18 @@ def test_only_the_current_question_of_ones_own_can_be_answered(app, person):
     one, two = person().begin(), person().begin()
     form = one.form("trial")
     with app.extensions["database"].read() as db:
-        ids = {owner: db.scalars(select(Trial.id).where(Trial.participant_id == owner).order_by(Trial.order)).all() for owner in (1, 2)}
+        ids = {
+            owner: db.scalars(
+                select(Trial.id).where(Trial.participant_id == owner).order_by(Trial.order)
+            ).all()
+            for owner in (1, 2)
+        }
     for trial in (ids[1][1], ids[2][0], 10**6):
-        reply = one.http.post("/question", data=form | {"trial": trial, "answer": 1}, headers={"Accept": "application/json"})
+        reply = one.http.post(
+            "/question",
+            data=form | {"trial": trial, "answer": 1},
+            headers={"Accept": "application/json"},
+        )
         assert (reply.status_code, reply.json["outcome"]) == (409, "stale")
     assert one.answers == [] and two.answers == []
 
@@ -136,7 +175,11 @@ def test_a_question_that_was_never_shown_cannot_be_answered(person):
     token = somebody.form("consent")["csrf_token"]
     somebody.http.post("/", data={"csrf_token": token, "consent": "yes"})
     somebody.http.post("/familiarity", data={"csrf_token": token, "familiarity": "2"})
-    reply = somebody.http.post("/question", data={"csrf_token": token, "trial": 1, "answer": 1}, headers={"Accept": "application/json"})
+    reply = somebody.http.post(
+        "/question",
+        data={"csrf_token": token, "trial": 1, "answer": 1},
+        headers={"Accept": "application/json"},
+    )
     assert (reply.status_code, reply.json["outcome"]) == (409, "stale")
 
 
@@ -144,7 +187,12 @@ def test_a_question_that_was_never_shown_cannot_be_answered(person):
 def test_an_answer_outside_the_scale_is_not_taken(person, answer):
     somebody = person().begin()
     form = somebody.form("trial") | {"answer": answer}
-    assert somebody.http.post("/question", data=form, headers={"Accept": "application/json"}).status_code == 400
+    assert (
+        somebody.http.post(
+            "/question", data=form, headers={"Accept": "application/json"}
+        ).status_code
+        == 400
+    )
     somebody.send("trial", answer=answer)
     assert somebody.answers == [] and "choose one of the five answers" in somebody.page.text
 
@@ -189,18 +237,29 @@ def test_no_code_before_all_answers(app, person):
     code = participant.completion_code
     somebody.get("/thanks")
     somebody.get("/")
-    assert somebody.path == "/thanks" and code in somebody.page.text  # the same code, however often it is looked at
+    assert (
+        somebody.path == "/thanks" and code in somebody.page.text
+    )  # the same code, however often it is looked at
 
 
 def test_withdrawn_answers_stay_in_the_database_and_end_the_questions(person):
     somebody = person().begin().answer(1, 2)
     form = somebody.form("trial") | {"answer": "1"}
     somebody.get("/withdraw")
-    somebody.page = somebody.http.post("/withdraw", data={"csrf_token": somebody.form("csrf_token")["csrf_token"]}, follow_redirects=True)
+    somebody.page = somebody.http.post(
+        "/withdraw",
+        data={"csrf_token": somebody.form("csrf_token")["csrf_token"]},
+        follow_redirects=True,
+    )
     assert somebody.path == "/withdrawn"
     somebody.get("/question")
     assert somebody.path == "/withdrawn"
-    assert somebody.http.post("/question", data=form, headers={"Accept": "application/json"}).status_code == 409
+    assert (
+        somebody.http.post(
+            "/question", data=form, headers={"Accept": "application/json"}
+        ).status_code
+        == 409
+    )
     assert somebody.answers == [1, 2]
 
 
@@ -219,7 +278,11 @@ def test_withdrawing_by_code_from_another_device(app, person):
 
 def test_another_person_on_the_same_device(person):
     somebody = person().begin().answer(*[0] * 30)
-    somebody.page = somebody.http.post("/another", data={"csrf_token": somebody.form("csrf_token")["csrf_token"]}, follow_redirects=True)
+    somebody.page = somebody.http.post(
+        "/another",
+        data={"csrf_token": somebody.form("csrf_token")["csrf_token"]},
+        follow_redirects=True,
+    )
     assert somebody.path == "/" and "consent" in somebody.form("consent")
     assert somebody.begin().answers == []
 
@@ -231,9 +294,10 @@ def test_several_people_at_once_and_one_who_clicks_wildly(app, person):
         somebody.begin()
         for i in range(30):
             form = somebody.form("trial") | {"answer": str(i % 5 - 2)}
-            with ThreadPoolExecutor(3) as clicks:  # three times the same click, each from a copy of the same browser
+            # three times the same click, each from a copy of the same browser
+            with ThreadPoolExecutor(3) as clicks:
                 cookie = somebody.http.get_cookie("subdermal").value
-                list(clicks.map(lambda _: click(app, cookie, form), range(3)))
+                list(clicks.map(click, [app] * 3, [cookie] * 3, [form] * 3))
             somebody.get("/question")
         return somebody.answers
 

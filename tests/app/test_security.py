@@ -14,14 +14,39 @@ from app.security import Limiter
 FRAMINGS = ("close-up", "head-shot", "half-length")
 TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
 
-POSTS = ["/", "/familiarity", "/question", "/withdraw", "/another", "/dashboard/login", "/dashboard/logout", "/simulation/"]
+POSTS = [
+    "/",
+    "/familiarity",
+    "/question",
+    "/withdraw",
+    "/another",
+    "/dashboard/login",
+    "/dashboard/logout",
+    "/simulation/",
+]
 CLOSED = [
     f"/dashboard/{name}"
-    for name in ("", "live.json", "responses.csv", "codebook.csv", "codebook.md", "report/", "report/report.html")
+    for name in (
+        "",
+        "live.json",
+        "responses.csv",
+        "codebook.csv",
+        "codebook.md",
+        "report/",
+        "report/report.html",
+    )
 ]
 OPEN = [
-    "/", "/familiarity", "/question", "/thanks", "/withdraw", "/withdrawn", "/study.css", "/dashboard/login",
-    "/simulation/", "/simulation/status.json",
+    "/",
+    "/familiarity",
+    "/question",
+    "/thanks",
+    "/withdraw",
+    "/withdrawn",
+    "/study.css",
+    "/dashboard/login",
+    "/simulation/",
+    "/simulation/status.json",
 ]
 
 
@@ -37,19 +62,27 @@ def addresses(app, method):
 
 @pytest.fixture
 def twin(study_dir):
-    """The application over simulated answers, which has every rule of the real one and a few of its own."""
+    """The application over simulated answers, which has every rule of the real one and a few of its
+    own.
+    """
     return create_app(study_dir, simulated=True)
 
 
 def test_the_lists_above_are_complete(twin):
     assert set(addresses(twin, "POST")) == set(POSTS)
-    rest = {path for path in addresses(twin, "GET") if not path.startswith(("/images/", "/static/"))}
+    rest = {
+        path for path in addresses(twin, "GET") if not path.startswith(("/images/", "/static/"))
+    }
     assert rest == {*CLOSED, *OPEN}
 
 
 @pytest.mark.parametrize("path", POSTS)
 def test_no_post_without_a_token(twin, path):
-    for data in ({}, {"csrf_token": "nonsense"}, {"consent": "yes", "trial": 1, "answer": 1, "password": "x"}):
+    for data in (
+        {},
+        {"csrf_token": "nonsense"},
+        {"consent": "yes", "trial": 1, "answer": 1, "password": "x"},
+    ):
         assert twin.test_client().post(path, data=data).status_code == 400
 
 
@@ -71,25 +104,46 @@ def test_headers_on_every_page(twin, logged_in):
     http = twin.test_client()
     if logged_in:
         secret = password.reset(twin.extensions["database"])
-        token = re.search(r'name="csrf_token" value="([^"]+)"', http.get("/dashboard/login").text)[1]
-        assert http.post("/dashboard/login", data={"csrf_token": token, "password": secret}).status_code == 303
+        token = re.search(r'name="csrf_token" value="([^"]+)"', http.get("/dashboard/login").text)[
+            1
+        ]
+        assert (
+            http.post(
+                "/dashboard/login", data={"csrf_token": token, "password": secret}
+            ).status_code
+            == 303
+        )
     for path in [*addresses(twin, "GET"), "/nowhere", "/images/" + "0" * 64]:
         response = http.get(path)
         assert response.status_code in (200, 303, 404), path
         headers = response.headers
         policy = headers["Content-Security-Policy"]
-        assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "base-uri 'none'" in policy, path
+        assert (
+            "default-src 'none'" in policy
+            and "frame-ancestors 'none'" in policy
+            and "base-uri 'none'" in policy
+        ), path
         assert "unsafe" not in policy, path
-        assert headers["X-Content-Type-Options"] == "nosniff" and headers["Referrer-Policy"] == "same-origin", path
+        assert (
+            headers["X-Content-Type-Options"] == "nosniff"
+            and headers["Referrer-Policy"] == "same-origin"
+        ), path
         cache = headers["Cache-Control"]
-        assert ("immutable" in cache) == (path.startswith("/images/") and response.status_code == 200), path
+        assert ("immutable" in cache) == (
+            path.startswith("/images/") and response.status_code == 200
+        ), path
         assert cache == "no-store" or path.startswith(("/images/", "/static/", "/study.css")), path
 
 
 def test_no_page_has_anything_inline(person, experimenter):
     """What the content policy forbids must not be there either: it would silently not work."""
     somebody = person()
-    pages = [somebody.get("/").text, somebody.begin().page.text, somebody.get("/withdraw").text, experimenter.get("/dashboard/").text]
+    pages = [
+        somebody.get("/").text,
+        somebody.begin().page.text,
+        somebody.get("/withdraw").text,
+        experimenter.get("/dashboard/").text,
+    ]
     for page in pages:
         assert not re.search(r"<style|\sstyle=|\son[a-z]+=|javascript:", page)
         assert all("src=" in tag for tag in re.findall(r"<script[^>]*>", page))
@@ -99,10 +153,15 @@ def test_cookies(app, person):
     response = app.test_client().get("/")
     cookie = response.headers["Set-Cookie"]
     assert "HttpOnly" in cookie and "SameSite=Lax" in cookie and "Secure" not in cookie
-    assert "; Secure" in app.test_client().get("/", base_url="https://study.example").headers["Set-Cookie"]
+    assert (
+        "; Secure"
+        in app.test_client().get("/", base_url="https://study.example").headers["Set-Cookie"]
+    )
     somebody = person().begin().answer(1)
     value = somebody.http.get_cookie("subdermal").value
-    somebody.http.set_cookie("subdermal", ("A" if value[0] != "A" else "B") + value[1:])  # a forged one is nobody's
+    somebody.http.set_cookie(
+        "subdermal", ("A" if value[0] != "A" else "B") + value[1:]
+    )  # a forged one is nobody's
     somebody.get("/question")
     assert somebody.path == "/"
 
@@ -124,7 +183,11 @@ def test_hostile_labels_are_escaped(tmp_path, write_study, request):
     somebody = Person(app)
     pages = [somebody.get("/").text]
     somebody.send("consent", consent="yes")
-    pages += [somebody.page.text, somebody.send("familiarity", familiarity=1).text, somebody.answer(1).page.text]
+    pages += [
+        somebody.page.text,
+        somebody.send("familiarity", familiarity=1).text,
+        somebody.answer(1).page.text,
+    ]
     somebody.get("/dashboard/login")
     somebody.send("password", password=password.reset(app.extensions["database"]))
     pages += [somebody.page.text, somebody.get("/dashboard/live.json").json["html"]]
@@ -156,7 +219,9 @@ def test_without_a_password_nobody_gets_in(person):
     assert somebody.send("password", password="None").status_code == 401
 
 
-def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(person, experimenter, app, monkeypatch):
+def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(
+    person, experimenter, app, monkeypatch
+):
     assert experimenter.get("/dashboard/").status_code == 200
     secret = password.reset(app.extensions["database"])
     experimenter.get("/dashboard/")
@@ -170,14 +235,21 @@ def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(person, 
     codes = [somebody.send("password", password="wrong").status_code for _ in range(5)]
     form = somebody.form("password")
     assert codes == [401] * 5
-    assert somebody.http.post("/dashboard/login", data=form | {"password": secret}).status_code == 429
+    assert (
+        somebody.http.post("/dashboard/login", data=form | {"password": secret}).status_code == 429
+    )
 
 
 def test_the_limiter_forgets_with_time_and_after_success(monkeypatch):
     clock = [0.0]
     monkeypatch.setattr("app.security.time.monotonic", lambda: clock[0])
     limiter = Limiter(attempts=2, window_s=10)
-    assert [limiter.allow("a"), limiter.allow("a"), limiter.allow("a"), limiter.allow("b")] == [True, True, False, True]
+    assert [limiter.allow("a"), limiter.allow("a"), limiter.allow("a"), limiter.allow("b")] == [
+        True,
+        True,
+        False,
+        True,
+    ]
     clock[0] = 11
     assert limiter.allow("a") and limiter.allow("a") and not limiter.allow("a")
     limiter.forget("a")
@@ -214,7 +286,11 @@ def test_a_failure_is_a_friendly_page_without_details(app, person, monkeypatch):
 
     monkeypatch.setattr("app.questionnaire.flow.current", fail)
     page = somebody.get("/question")
-    assert page.status_code == 500 and "saved are safe" in page.text and "secret detail" not in page.text
+    assert (
+        page.status_code == 500
+        and "saved are safe" in page.text
+        and "secret detail" not in page.text
+    )
     assert page.headers["Content-Security-Policy"].startswith("default-src 'none'")
     reply = somebody.http.get("/question", headers={"Accept": "application/json"})
     assert reply.status_code == 500 and "secret" not in reply.text
@@ -226,6 +302,11 @@ def test_images_are_served_only_as_their_hash_says(app, study_dir):
     response = http.get(f"/images/{sha256}")
     assert response.data == image.path.read_bytes() and response.content_type == "image/png"
     assert response.headers["Cache-Control"] == "public, max-age=31536000, immutable"
-    assert http.get(f"/images/{sha256}", headers={"If-None-Match": response.headers["ETag"]}).status_code == 304
+    assert (
+        http.get(
+            f"/images/{sha256}", headers={"If-None-Match": response.headers["ETag"]}
+        ).status_code
+        == 304
+    )
     image.path.write_bytes(image.path.read_bytes() + b"more")
     assert http.get(f"/images/{sha256}").status_code == 404

@@ -1,4 +1,6 @@
-"""`subdermal serve` as a process: what it prints, what it refuses, what survives when it is killed."""
+"""`subdermal serve` as a process: what it prints, what it refuses, what survives when it is
+killed.
+"""
 
 import re
 import signal
@@ -20,7 +22,9 @@ class Server:
 
     def __init__(self, *arguments):
         self.process = subprocess.Popen(
-            [sys.executable, "-u", "-m", "app.cli", "serve", *map(str, arguments), "--port", "0"], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-u", "-m", "app.cli", "serve", *map(str, arguments), "--port", "0"],
+            stdout=subprocess.PIPE,
+            text=True,
         )
         self.printed = ""
         for line in self.process.stdout:
@@ -58,7 +62,9 @@ def token(page):
 
 def log_in(http, url, secret):
     page = http.get(f"{url}dashboard/login")
-    return http.post(f"{url}dashboard/login", data={"csrf_token": token(page), "password": secret}).url.path
+    return http.post(
+        f"{url}dashboard/login", data={"csrf_token": token(page), "password": secret}
+    ).url.path
 
 
 def test_killed_between_an_answer_and_the_next_page_nothing_is_lost(study_dir, serve):
@@ -66,9 +72,19 @@ def test_killed_between_an_answer_and_the_next_page_nothing_is_lost(study_dir, s
     with httpx.Client(follow_redirects=True) as http:
         page = http.get(server.url)
         page = http.post(server.url, data={"csrf_token": token(page), "consent": "yes"})
-        page = http.post(f"{server.url}familiarity", data={"csrf_token": token(page), "familiarity": "3"})
-        fields = dict(re.findall(r'name="(csrf_token|trial|image_left|image_right)" value="([^"]+)"', page.text))
-        acknowledged = http.post(f"{server.url}question", data=fields | {"answer": "2"}, headers={"Accept": "application/json"})
+        page = http.post(
+            f"{server.url}familiarity", data={"csrf_token": token(page), "familiarity": "3"}
+        )
+        fields = dict(
+            re.findall(
+                r'name="(csrf_token|trial|image_left|image_right)" value="([^"]+)"', page.text
+            )
+        )
+        acknowledged = http.post(
+            f"{server.url}question",
+            data=fields | {"answer": "2"},
+            headers={"Accept": "application/json"},
+        )
         assert acknowledged.json()["outcome"] == "recorded"
         server.kill()  # no next page was asked for
 
@@ -76,7 +92,11 @@ def test_killed_between_an_answer_and_the_next_page_nothing_is_lost(study_dir, s
         assert again.find("password") is None  # it was shown at the first start
         page = http.get(f"{again.url}question")  # cookies know no ports: the same browser
         assert "Question 2 <span>" in page.text
-        repeated = http.post(f"{again.url}question", data=fields | {"answer": "2"}, headers={"Accept": "application/json"})
+        repeated = http.post(
+            f"{again.url}question",
+            data=fields | {"answer": "2"},
+            headers={"Accept": "application/json"},
+        )
         assert repeated.json()["outcome"] == "repeated"
 
 
@@ -133,7 +153,17 @@ def test_behind_a_proxy_that_ends_https_the_cookie_is_for_https_only(study_dir, 
     assert "; Secure" in cookie and "; Secure" not in httpx.get(server.url).headers["Set-Cookie"]
     headers = forwarded | {"Cookie": cookie.split(";")[0]}
     data = {"csrf_token": token(page), "consent": "yes"}
-    assert httpx.post(server.url, data=data, headers=headers | {"Referer": "https://evil.example/"}).status_code == 400
-    assert httpx.post(server.url, data=data, headers=headers | {"Referer": "https://study.example/"}).status_code == 303
+    assert (
+        httpx.post(
+            server.url, data=data, headers=headers | {"Referer": "https://evil.example/"}
+        ).status_code
+        == 400
+    )
+    assert (
+        httpx.post(
+            server.url, data=data, headers=headers | {"Referer": "https://study.example/"}
+        ).status_code
+        == 303
+    )
     plain = serve(study_dir)  # without the option, nobody is believed
     assert "; Secure" not in httpx.get(plain.url, headers=forwarded).headers["Set-Cookie"]

@@ -47,7 +47,10 @@ def test_running_again_tops_up_and_goes_on_half_way(tmp_path, write_study, capsy
         answering.close()
     assert simulate(parts, "--participants", 3) == 0
     ignored = {"times_shown"}
-    tables = [[{k: v for k, v in row.items() if k not in ignored} for row in rows(study)] for study in (whole, parts)]
+    tables = [
+        [{k: v for k, v in row.items() if k not in ignored} for row in rows(study)]
+        for study in (whole, parts)
+    ]
     assert len(tables[0]) == 90 and tables[0] == tables[1]
     assert simulate(parts, "--participants", 3) == 0
     assert "90 simulated answers, 0 participants new" in capsys.readouterr().out
@@ -55,7 +58,9 @@ def test_running_again_tops_up_and_goes_on_half_way(tmp_path, write_study, capsy
 
 def test_every_row_and_page_is_marked(study_dir):
     assert simulate(study_dir, "--participants", 1) == 0
-    assert {row["simulated"] for row in rows(study_dir)} == {"1"} and {row["completed"] for row in rows(study_dir)} == {"1"}
+    assert {row["simulated"] for row in rows(study_dir)} == {"1"} and {
+        row["completed"] for row in rows(study_dir)
+    } == {"1"}
     assert "All answers are simulated" in (study_dir / "simulated" / "codebook.md").read_text()
     http = create_app(study_dir, simulated=True).test_client()
     for path in ("/", "/withdraw", "/dashboard/login", "/simulation/", "/nowhere"):
@@ -104,7 +109,9 @@ def test_wrong_addresses_and_seeds_get_one_line(tmp_path, write_study, study_dir
 
 
 def test_answers_follow_the_published_findings(study_dir):
-    """200 participants of the thesis's design: close-up prefers golubev_plus then golubev, and points fall with distance."""
+    """200 participants of the thesis's design: close-up prefers golubev_plus then golubev, and
+    points fall with distance.
+    """
     study = Study.open(study_dir)
     crowd = Crowd(study, 1)
     points = {framing: dict.fromkeys(study.techniques, 0) for framing in study.framings}
@@ -113,12 +120,20 @@ def test_answers_follow_the_published_findings(study_dir):
 
     for number in range(1, 201):
         for trial in trials(study.framings, study.techniques, study.seed, number):
-            answer, rt_ms = crowd.answer(number, trial.order, trial.framing, trial.left, trial.right)
+            answer, rt_ms = crowd.answer(
+                number, trial.order, trial.framing, trial.left, trial.right
+            )
             assert -2 <= answer <= 2 and rt_ms > 0
             points[trial.framing][trial.left if answer < 0 else trial.right] += abs(answer)
             sides.append(answer)
     close, half = points["close-up"], points["half-length"]
-    assert sorted(close, key=close.get) == ["none", "jimenez_separable", "jimenez_gaussian", "golubev", "golubev_plus"]
+    assert sorted(close, key=close.get) == [
+        "none",
+        "jimenez_separable",
+        "jimenez_gaussian",
+        "golubev",
+        "golubev_plus",
+    ]
     assert max(half, key=half.get) == "none"
     totals = [sum(points[framing].values()) for framing in study.framings]
     assert totals[0] > 1.3 * totals[1] > 1.3 * totals[2]
@@ -131,7 +146,12 @@ def test_published_priorities_sum_to_one():
 
 
 def test_a_study_that_the_thesis_did_not_have_is_simulated_too(tmp_path, write_study):
-    study = Study.open(write_study(tmp_path / "new", framings=[{"name": n, "label": n} for n in ("close-up", "head-shot", "half-length")]))
+    study = Study.open(
+        write_study(
+            tmp_path / "new",
+            framings=[{"name": n, "label": n} for n in ("close-up", "head-shot", "half-length")],
+        )
+    )
     crowd = Crowd(study, 1)
     assert set(crowd._worths["close-up"]) == set(study.techniques)
 
@@ -143,6 +163,8 @@ def test_answers_sent_are_answers_stored(study_dir):
     with app.extensions["database"].read() as db:
         for response in db.scalars(select(Response)):
             trial = response.trial
-            assert (response.answer, response.rt_ms) == crowd.answer(1, trial.order, trial.framing, trial.left, trial.right)
+            assert (response.answer, response.rt_ms) == crowd.answer(
+                1, trial.order, trial.framing, trial.left, trial.right
+            )
         assert db.get(Participant, 1).familiarity == crowd.familiarity(1)
     assert study.seed == 7

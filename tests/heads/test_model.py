@@ -21,19 +21,25 @@ def model(anatomy):
 
 def cube():
     points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    quads = np.array(
+        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    )
     return points, quads
 
 
 def test_catmull_clark_of_a_cube():
-    """First level of the cube, by hand: face points 1, edge points 3/4, corners 5/9 of the half edge."""
+    """First level of the cube, by hand: face points 1, edge points 3/4, corners 5/9 of the half
+    edge.
+    """
     points, quads = cube()
     smooth, children = subdivide.catmull_clark(quads, 8)
     new = smooth @ points
     np.testing.assert_allclose(np.asarray(smooth.sum(axis=1)).ravel(), 1)
     assert new.shape == (26, 3) and children.shape == (24, 4)
     np.testing.assert_allclose(np.abs(new[:8]), 5 / 9, atol=1e-12)
-    np.testing.assert_allclose(np.sort(np.abs(new[8:20]), axis=1), np.tile([0, 0.75, 0.75], (12, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        np.sort(np.abs(new[8:20]), axis=1), np.tile([0, 0.75, 0.75], (12, 1)), atol=1e-12
+    )
     np.testing.assert_allclose(np.abs(new[20:]).sum(axis=1), 1)
 
 
@@ -53,12 +59,20 @@ def test_the_default_head_is_an_adult_head_in_millimetres(anatomy):
     assert 54 < apart < 70  # adults: 51 to 77, mean 63 (Dodgson 2004, doi:10.1117/12.529999)
     assert 200 < -mark["chin"][1] < 250  # crown to chin; adult men about 232
     assert 11 < anatomy.eyes[0].radius < 15.5
-    assert mark["nose"][1] > mark["mouth"][1] > mark["chin"][1] and mark["ear_l"][0] > 60 and mark["ear_r"][0] < -60
+    assert (
+        mark["nose"][1] > mark["mouth"][1] > mark["chin"][1]
+        and mark["ear_l"][0] > 60
+        and mark["ear_r"][0] < -60
+    )
 
 
 def test_model_parts_fit_together(model):
     skin = model.skin
-    assert skin.masks.shape == (len(skin.positions), len(MASKS)) and skin.masks.min() >= 0 and skin.masks.max() <= 1
+    assert (
+        skin.masks.shape == (len(skin.positions), len(MASKS))
+        and skin.masks.min() >= 0
+        and skin.masks.max() <= 1
+    )
     assert all(skin.masks[:, k].max() > 0.5 for k in range(len(MASKS)))
     np.testing.assert_allclose(np.linalg.norm(skin.normals, axis=1), 1, atol=1e-5)
     assert skin.faces.max() < len(skin.positions) and len(skin.faces) > 150_000
@@ -70,13 +84,18 @@ def test_model_parts_fit_together(model):
     assert np.quantile(roots, 0.99) < 8 and strands.cover.min() >= 0 and strands.cover.max() <= 1
     for eye in model.eyes:
         reach = np.linalg.norm(eye.positions - eye.centre, axis=1)
-        assert reach.min() >= eye.radius - 1e-3 and 0.8 < reach.max() - eye.radius < 3.0  # the cornea stands out
+        assert (
+            reach.min() >= eye.radius - 1e-3 and 0.8 < reach.max() - eye.radius < 3.0
+        )  # the cornea stands out
 
 
 def test_hair_repeats_for_one_seed_and_changes_with_it(anatomy, model):
     again, other = (default_model(anatomy, seed=s, hair_share=0.05) for s in (3, 4))
     np.testing.assert_array_equal(again.strands.points, model.strands.points)
-    assert again.strands.points.shape == other.strands.points.shape and (again.strands.points != other.strands.points).any()
+    assert (
+        again.strands.points.shape == other.strands.points.shape
+        and (again.strands.points != other.strands.points).any()
+    )
 
 
 def test_a_scan_renders(tmp_path):
@@ -99,7 +118,11 @@ def write_parts(file, parts):
     """An OBJ of named groups (name, mesh)."""
     lines, start = [], 1
     for name, mesh in parts:
-        lines += [f"g {name}", *(f"v {x} {y} {z}" for x, y, z in mesh.vertices), *(f"f {a} {b} {c}" for a, b, c in mesh.faces + start)]
+        lines += [
+            f"g {name}",
+            *(f"v {x} {y} {z}" for x, y, z in mesh.vertices),
+            *(f"f {a} {b} {c}" for a, b, c in mesh.faces + start),
+        ]
         start += len(mesh.vertices)
     file.write_text("\n".join(lines), encoding="utf-8")
 
@@ -141,5 +164,10 @@ def test_a_large_scan_is_baked_on_a_cluster(monkeypatch, tmp_path):
     monkeypatch.setattr(module, "CLUSTER_MM", 12.0)
     proxy = scan_model(read_scan(file, unit="mm")).skin.proxy
     assert len(proxy.positions) < 5000 and proxy.faces.max() < len(proxy.positions)
-    assert np.linalg.norm(proxy.to_full @ proxy.positions - ball.vertices[: proxy.to_full.shape[0]], axis=1).max() < 260  # same size of body
+    assert (
+        np.linalg.norm(
+            proxy.to_full @ proxy.positions - ball.vertices[: proxy.to_full.shape[0]], axis=1
+        ).max()
+        < 260
+    )  # same size of body
     np.testing.assert_allclose(np.asarray(proxy.to_full.sum(axis=1)).ravel(), 1)

@@ -1,4 +1,6 @@
-"""A user's own head: what is read, what is made of it, and the one line for everything that cannot be used."""
+"""A user's own head: what is read, what is made of it, and the one line for everything that cannot
+be used.
+"""
 
 import base64
 import io
@@ -19,15 +21,21 @@ RADII_MM = np.array([75.0, 115.0, 100.0])  # an ellipsoid of a head's size: 230 
 
 
 def ellipsoid(rings: int = 24, segments: int = 32) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (mm), uvs and outward faces of a head-sized ellipsoid with a texture seam: its first and last column coincide."""
+    """Positions (mm), uvs and outward faces of a head-sized ellipsoid with a texture seam: its
+    first and last column coincide.
+    """
     v, u = np.meshgrid(np.linspace(0, 1, rings + 1), np.linspace(0, 1, segments + 1), indexing="ij")
     angle = 2 * np.pi * (u % 1)
     circle = np.where((v == 0) | (v == 1), 0.0, np.sin(np.pi * v))
-    unit = np.stack([circle * np.sin(angle), -np.cos(np.pi * v), circle * np.cos(angle)], axis=-1).reshape(-1, 3)
+    unit = np.stack(
+        [circle * np.sin(angle), -np.cos(np.pi * v), circle * np.cos(angle)], axis=-1
+    ).reshape(-1, 3)
     a = (np.arange(rings)[:, None] * (segments + 1) + np.arange(segments)).reshape(-1)
     b, c, d = a + 1, a + segments + 2, a + segments + 1
     upper, lower = np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)
-    faces = np.concatenate([upper[segments:], lower[:-segments]])  # without those that shrink to nothing at the poles
+    faces = np.concatenate(
+        [upper[segments:], lower[:-segments]]
+    )  # without those that shrink to nothing at the poles
     return unit * RADII_MM, np.stack([u, v], axis=-1).reshape(-1, 2), faces
 
 
@@ -35,8 +43,16 @@ def obj_text(positions, faces, uvs=None, normals=None, head: str = "") -> str:
     """An OBJ file; all indices of a corner are the same."""
     lines = [head] + ["v {:.9g} {:.9g} {:.9g}".format(*p) for p in positions]
     lines += ["vt {:.9g} {:.9g}".format(*t) for t in (uvs if uvs is not None else [])]
-    lines += ["vn {:.9g} {:.9g} {:.9g}".format(*n) for n in (normals if normals is not None else [])]
-    corner = "{0}/{0}/{0}" if normals is not None and uvs is not None else "{0}/{0}" if uvs is not None else "{0}"
+    lines += [
+        "vn {:.9g} {:.9g} {:.9g}".format(*n) for n in (normals if normals is not None else [])
+    ]
+    corner = (
+        "{0}/{0}/{0}"
+        if normals is not None and uvs is not None
+        else "{0}/{0}"
+        if uvs is not None
+        else "{0}"
+    )
     corner = "{0}//{0}" if normals is not None and uvs is None else corner
     lines += ["f " + " ".join(corner.format(i + 1) for i in face) for face in faces]
     return "\n".join(lines) + "\n"
@@ -49,20 +65,32 @@ def flat_image(colour, size=(8, 8)) -> Image.Image:
 def quarters(side: int = 16) -> Image.Image:
     """A texture whose four quarters tell which way it lies: red, green above blue, white."""
     image, half = np.zeros((side, side, 3), np.uint8), side // 2
-    image[:half, :half], image[:half, half:], image[half:, :half], image[half:, half:] = (255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)
+    image[:half, :half], image[:half, half:], image[half:, :half], image[half:, half:] = (
+        (255, 0, 0),
+        (0, 255, 0),
+        (0, 0, 255),
+        (255, 255, 255),
+    )
     return Image.fromarray(image)
 
 
 def look_up(image: np.ndarray, uvs: np.ndarray) -> np.ndarray:
-    """The nearest texels at these texture coordinates, v up, repeating: what a renderer would see."""
+    """The nearest texels at these texture coordinates, v up, repeating:
+    what a renderer would see.
+    """
     height, width = image.shape[:2]
     column = np.floor((uvs[:, 0] % 1) * width).astype(int).clip(0, width - 1)
     row = np.floor((1 - uvs[:, 1] % 1) * height).astype(int).clip(0, height - 1)
     return image[row, column]
 
 
-def gltf_document(attributes: dict, faces=None, material: dict | None = None, images=(), **extra) -> dict:
-    """A glTF document with one mesh, everything inside as base64. Attributes: name -> array, or (array, accessor properties)."""
+def gltf_document(
+    attributes: dict, faces=None, material: dict | None = None, images=(), **extra
+) -> dict:
+    """A glTF document with one mesh, everything inside as base64.
+
+    Attributes: name -> array, or (array, accessor properties).
+    """
     document = {
         "asset": {"version": "2.0"},
         "scenes": [{"nodes": [0]}],
@@ -78,10 +106,20 @@ def gltf_document(attributes: dict, faces=None, material: dict | None = None, im
         nonlocal blob
         array = np.asarray(array)
         kind = ("SCALAR", "", "VEC2", "VEC3", "VEC4")[array.ndim > 1 and array.shape[1]]
-        document["bufferViews"].append({"buffer": 0, "byteOffset": len(blob), "byteLength": array.nbytes})
+        document["bufferViews"].append(
+            {"buffer": 0, "byteOffset": len(blob), "byteLength": array.nbytes}
+        )
         code = codes[array.dtype.str[1:]]
         view = len(document["bufferViews"]) - 1
-        document["accessors"].append({"bufferView": view, "componentType": code, "count": len(array), "type": kind, **properties})
+        document["accessors"].append(
+            {
+                "bufferView": view,
+                "componentType": code,
+                "count": len(array),
+                "type": kind,
+                **properties,
+            }
+        )
         blob += array.tobytes() + b"\0" * (-array.nbytes % 4)
         return len(document["accessors"]) - 1
 
@@ -95,8 +133,13 @@ def gltf_document(attributes: dict, faces=None, material: dict | None = None, im
         document["materials"] = [material]
     if images:
         document["textures"] = [{"source": i} for i in range(len(images))]
-        document["images"] = [{"uri": "data:image/png;base64," + base64.b64encode(png(image)).decode()} for image in images]
-    document["buffers"] = [{"byteLength": len(blob), "uri": "data:;base64," + base64.b64encode(blob).decode()}]
+        document["images"] = [
+            {"uri": "data:image/png;base64," + base64.b64encode(png(image)).decode()}
+            for image in images
+        ]
+    document["buffers"] = [
+        {"byteLength": len(blob), "uri": "data:;base64," + base64.b64encode(blob).decode()}
+    ]
     return document | extra
 
 
@@ -112,7 +155,9 @@ def metres(positions) -> np.ndarray:
 
 @pytest.fixture
 def folder(tmp_path):
-    """Writes files (text, bytes, image, glTF document or trimesh) into a folder and reads the first as a scan."""
+    """Writes files (text, bytes, image, glTF document or trimesh) into a folder and reads the first
+    as a scan.
+    """
 
     def read(files: dict, **options):
         for name, content in files.items():
@@ -158,10 +203,20 @@ def assert_outward(scan, part: int = 0, middle=(0, 0, 0)):
 def test_an_obj_becomes_millimetres_triangles_normals_and_uvs(folder):
     positions, uvs, faces = ellipsoid()
     scan = folder({"head.obj": obj_text(positions, faces, uvs)})
-    assert scan.name == "head" and (scan.positions_mm.dtype, scan.faces.dtype) == (np.float32, np.int32)
+    assert scan.name == "head" and (scan.positions_mm.dtype, scan.faces.dtype) == (
+        np.float32,
+        np.int32,
+    )
     assert len(scan.faces) == len(faces)
-    np.testing.assert_allclose(np.sort(scan.positions_mm[scan.faces], axis=None), np.sort(positions[faces], axis=None), atol=1e-4)
-    assert scan.normals.shape == scan.positions_mm.shape and scan.uvs.shape == (len(scan.positions_mm), 2)
+    np.testing.assert_allclose(
+        np.sort(scan.positions_mm[scan.faces], axis=None),
+        np.sort(positions[faces], axis=None),
+        atol=1e-4,
+    )
+    assert scan.normals.shape == scan.positions_mm.shape and scan.uvs.shape == (
+        len(scan.positions_mm),
+        2,
+    )
     assert scan.albedo is scan.normal_map is scan.roughness is scan.base_colour is None
     assert scan.part_names == ("head",) and scan.part_kinds == ("skin",) and (scan.parts == 0).all()
     assert list(scan.files) == ["head.obj"] and len(scan.files["head.obj"]) == 64
@@ -184,7 +239,9 @@ def test_given_normals_are_kept_at_unit_length(folder):
     given = positions + (0, 40, 0)  # tilted on purpose
     scan = folder({"head.obj": obj_text(positions, faces, uvs, 3 * given)})
     expected = scan.positions_mm + (0, 40, 0)
-    np.testing.assert_allclose(scan.normals, expected / np.linalg.norm(expected, axis=1, keepdims=True), atol=1e-5)
+    np.testing.assert_allclose(
+        scan.normals, expected / np.linalg.norm(expected, axis=1, keepdims=True), atol=1e-5
+    )
 
 
 def test_a_given_normal_of_no_length_is_computed(folder):
@@ -205,16 +262,28 @@ def test_a_gltf_keeps_its_textures_the_right_way_up(tmp_path, suffix):
         normalTexture=flat_image((128, 128, 255), (4, 4)),
         metallicRoughnessTexture=flat_image((0, 77, 0), (2, 2)),
     )
-    mesh = trimesh.Trimesh(metres(positions), faces, visual=TextureVisuals(uvs, material=material), process=False)
+    mesh = trimesh.Trimesh(
+        metres(positions), faces, visual=TextureVisuals(uvs, material=material), process=False
+    )
     trimesh.Scene(mesh).export(tmp_path / f"head.{suffix}")
     scan = read_scan(tmp_path / f"head.{suffix}")
-    assert (scan.unit, scan.unit_source, scan.up, scan.up_source, scan.notes) == ("m", "format", "y", "format", ())
+    assert (scan.unit, scan.unit_source, scan.up, scan.up_source, scan.notes) == (
+        "m",
+        "format",
+        "y",
+        "format",
+        (),
+    )
     np.testing.assert_allclose(np.ptp(scan.positions_mm, axis=0), 2 * RADII_MM, rtol=1e-3)
     np.testing.assert_array_equal(scan.albedo, np.asarray(quarters()))
     assert scan.normal_map.shape == (4, 4, 3) and (scan.normal_map == (128, 128, 255)).all()
-    assert scan.roughness.shape == (2, 2) and (scan.roughness == 77).all() and scan.base_colour is None
+    assert (
+        scan.roughness.shape == (2, 2) and (scan.roughness == 77).all() and scan.base_colour is None
+    )
     high_left = (scan.uvs[:, 0] < 0.45) & (abs(scan.uvs[:, 1] - 0.77) < 0.22)
-    assert (look_up(scan.albedo, scan.uvs[high_left]) == (255, 0, 0)).all() and (scan.positions_mm[high_left, 1] > 0).all()
+    assert (look_up(scan.albedo, scan.uvs[high_left]) == (255, 0, 0)).all() and (
+        scan.positions_mm[high_left, 1] > 0
+    ).all()
     assert scan.part_names == ("Skin",)
     assert (len(scan.files) > 1) == (suffix == "gltf")
 
@@ -222,12 +291,19 @@ def test_a_gltf_keeps_its_textures_the_right_way_up(tmp_path, suffix):
 def test_a_scene_graph_is_applied_and_meshes_are_joined_by_part(folder):
     positions, _, faces = ellipsoid(12, 16)
     normals = positions / RADII_MM**2
-    document = gltf_document({"POSITION": metres(positions), "NORMAL": normals.astype("<f4")}, faces, {"name": "Skin"})
+    document = gltf_document(
+        {"POSITION": metres(positions), "NORMAL": normals.astype("<f4")}, faces, {"name": "Skin"}
+    )
     document["scenes"] = [{"nodes": [0]}]
     document["nodes"] = [
         {"scale": [0.01, 0.01, 0.01], "children": [1, 2]},  # a scene in centimetres
         {"mesh": 0, "matrix": [100, 0, 0, 0, 0, 100, 0, 0, 0, 0, 100, 0, 5, 0, 0, 1]},
-        {"mesh": 1, "rotation": [0, 0, np.sqrt(0.5), np.sqrt(0.5)], "scale": [-20, 20, 20], "translation": [-3, 4, 8]},
+        {
+            "mesh": 1,
+            "rotation": [0, 0, np.sqrt(0.5), np.sqrt(0.5)],
+            "scale": [-20, 20, 20],
+            "translation": [-3, 4, 8],
+        },
         {"mesh": 0, "translation": [9, 9, 9]},  # not in the scene
     ]
     eye = json.loads(json.dumps(document["meshes"][0]))
@@ -236,10 +312,16 @@ def test_a_scene_graph_is_applied_and_meshes_are_joined_by_part(folder):
     document["materials"].append({"name": "Std_Eye_L"})
     scan = folder({"head.gltf": document})
     assert scan.part_names == ("Skin", "Std_Eye_L") and scan.part_kinds == ("skin", "eye")
-    head, eyeball = (scan.positions_mm[np.unique(scan.faces[scan.parts == part])] for part in (0, 1))
-    np.testing.assert_allclose([head.min(0), head.max(0)], [(50, 0, 0) - RADII_MM, (50, 0, 0) + RADII_MM], atol=0.1)
+    head, eyeball = (
+        scan.positions_mm[np.unique(scan.faces[scan.parts == part])] for part in (0, 1)
+    )
+    np.testing.assert_allclose(
+        [head.min(0), head.max(0)], [(50, 0, 0) - RADII_MM, (50, 0, 0) + RADII_MM], atol=0.1
+    )
     turned = 0.2 * RADII_MM[[1, 0, 2]]  # a quarter turn about z
-    np.testing.assert_allclose([eyeball.min(0), eyeball.max(0)], [(-30, 40, 80) - turned, (-30, 40, 80) + turned], atol=0.1)
+    np.testing.assert_allclose(
+        [eyeball.min(0), eyeball.max(0)], [(-30, 40, 80) - turned, (-30, 40, 80) + turned], atol=0.1
+    )
     assert_outward(scan, 0, (50, 0, 0))
     assert_outward(scan, 1, (-30, 40, 80))  # the eye was mirrored
 
@@ -247,22 +329,40 @@ def test_a_scene_graph_is_applied_and_meshes_are_joined_by_part(folder):
 def test_normals_follow_a_scale_that_is_not_even(folder):
     positions, _, faces = ellipsoid()
     sphere = positions / RADII_MM
-    document = gltf_document({"POSITION": sphere.astype("<f4"), "NORMAL": sphere.astype("<f4")}, faces)
+    document = gltf_document(
+        {"POSITION": sphere.astype("<f4"), "NORMAL": sphere.astype("<f4")}, faces
+    )
     document["nodes"][0]["scale"] = list(RADII_MM / 1000)
     scan = folder({"head.gltf": document})
     gradient = scan.positions_mm / RADII_MM**2
-    np.testing.assert_allclose(scan.normals, gradient / np.linalg.norm(gradient, axis=1, keepdims=True), atol=1e-5)
+    np.testing.assert_allclose(
+        scan.normals, gradient / np.linalg.norm(gradient, axis=1, keepdims=True), atol=1e-5
+    )
 
 
 def test_packed_and_transformed_texture_coordinates_are_unpacked(folder):
     positions, uvs, faces = ellipsoid()
     down = uvs * (1, -1) + (0, 1)  # glTF's v points down
-    transform = {"KHR_texture_transform": {"offset": [0.1, 0.2], "scale": [0.5, 0.25], "rotation": np.pi / 2}}
+    transform = {
+        "KHR_texture_transform": {"offset": [0.1, 0.2], "scale": [0.5, 0.25], "rotation": np.pi / 2}
+    }
     packed = (np.rint(down * 65535).astype("<u2"), {"normalized": True})
-    material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1, "extensions": transform}}}
-    document = gltf_document({"POSITION": metres(positions), "TEXCOORD_1": packed}, faces, material, [quarters()])
+    material = {
+        "pbrMetallicRoughness": {
+            "baseColorTexture": {"index": 0, "texCoord": 1, "extensions": transform}
+        }
+    }
+    document = gltf_document(
+        {"POSITION": metres(positions), "TEXCOORD_1": packed}, faces, material, [quarters()]
+    )
     scan = folder({"head.gltf": document | {"extensionsRequired": ["KHR_texture_transform"]}})
-    plain = folder({"plain.gltf": gltf_document({"POSITION": metres(positions), "TEXCOORD_0": down.astype("<f4")}, faces)})
+    plain = folder(
+        {
+            "plain.gltf": gltf_document(
+                {"POSITION": metres(positions), "TEXCOORD_0": down.astype("<f4")}, faces
+            )
+        }
+    )
     u, v = (plain.uvs * (1, -1) + (0, 1)).T
     # Scale, a quarter turn counter-clockwise (as seen, v pointing down), offset.
     expected = np.stack([0.1 + 0.25 * v, 0.2 - 0.5 * u], axis=1) * (1, -1) + (0, 1)
@@ -271,7 +371,9 @@ def test_packed_and_transformed_texture_coordinates_are_unpacked(folder):
 
 def test_strips_and_interleaved_attributes_are_read(folder):
     quad = np.array([[-75, -115, 0], [75, -115, 0], [-75, 115, 50], [75, 115, 50]], float)
-    document = gltf_document({"POSITION": np.hstack([metres(quad), np.full((4, 1), np.nan, "<f4")])})
+    document = gltf_document(
+        {"POSITION": np.hstack([metres(quad), np.full((4, 1), np.nan, "<f4")])}
+    )
     document["accessors"][0]["type"] = "VEC3"
     document["bufferViews"][0]["byteStride"] = 16
     document["meshes"][0]["primitives"][0]["mode"] = 5
@@ -306,10 +408,20 @@ def test_factors_are_multiplied_onto_textures_in_linear_light(folder):
 def test_without_a_texture_the_colour_of_the_material_is_given(folder):
     positions, _, faces = ellipsoid()
     material = {"pbrMetallicRoughness": {"baseColorFactor": [0.6, 0.4, 0.3, 1]}}
-    assert folder({"head.gltf": gltf_document({"POSITION": metres(positions)}, faces, material)}).base_colour == (0.6, 0.4, 0.3)
-    files = {"head.obj": obj_text(positions, faces, head="mtllib a.mtl\nusemtl skin"), "a.mtl": "newmtl skin\nKd 0.6 0.4 0.3\n"}
+    assert folder(
+        {"head.gltf": gltf_document({"POSITION": metres(positions)}, faces, material)}
+    ).base_colour == (0.6, 0.4, 0.3)
+    files = {
+        "head.obj": obj_text(positions, faces, head="mtllib a.mtl\nusemtl skin"),
+        "a.mtl": "newmtl skin\nKd 0.6 0.4 0.3\n",
+    }
     assert folder(files).base_colour == (0.6, 0.4, 0.3)
-    assert folder({"plain.gltf": gltf_document({"POSITION": metres(positions)}, faces, {})}).base_colour is None
+    assert (
+        folder(
+            {"plain.gltf": gltf_document({"POSITION": metres(positions)}, faces, {})}
+        ).base_colour
+        is None
+    )
 
 
 # OBJ and its material library
@@ -331,7 +443,10 @@ v -75 115 100
     [
         "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8",
         "f -5 -6 -7 -8\nf -4 -3 -2 -1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8",
-        "f 4 3 2\r\nf 4 2 1\r\nf 5 6 7 8 # a comment\r\nf 1\t2 6 \\\r\n 5\r\n  f 2 3 7 6\r\nf 3 4 8 7 \r\n\r\nf 4 1 5 8\r\n",
+        (
+            "f 4 3 2\r\nf 4 2 1\r\nf 5 6 7 8 # a comment\r\nf 1\t2 6 \\\r\n 5\r\n  f 2 3 7 "
+            "6\r\nf 3 4 8 7 \r\n\r\nf 4 1 5 8\r\n"
+        ),
         "vn 0 0 1\nf 4//1 3//1 2 1//1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8",
         "vt 0 0\nf 4/1 3/1 2 1/1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8",
     ],
@@ -355,7 +470,9 @@ def test_a_polygon_is_fanned(folder):
 def test_positions_are_not_merged_where_uvs_or_normals_differ(folder):
     scan = folder({"box.obj": QUADS + "vt 0 0\nvt 1 0\nf 1/1 2/1 6/1 5/1\nf 2/2 3/2 7/2 6/2"})
     assert len(scan.positions_mm) == 8 and sorted(scan.uvs[:, 0]) == [0] * 4 + [1] * 4
-    scan = folder({"box.obj": QUADS + "vn 0 -1 0\nvn 1 0 0\nf 1//1 2//1 6//1 5//1\nf 2//2 3//2 7//2 6//2"})
+    scan = folder(
+        {"box.obj": QUADS + "vn 0 -1 0\nvn 1 0 0\nf 1//1 2//1 6//1 5//1\nf 2//2 3//2 7//2 6//2"}
+    )
     assert len(scan.positions_mm) == 8 and sorted(scan.normals[:, 0]) == [0] * 4 + [1] * 4
 
 
@@ -379,10 +496,20 @@ map_Bump -bm 1.0 normals.png
     scan = folder(files)
     assert (scan.albedo == np.asarray(quarters())).all() and scan.base_colour is None
     assert (scan.roughness == 99).all() and (scan.normal_map == (130, 125, 250)).all()
-    assert list(scan.files) == ["head.obj", "head materials.mtl", "my head.png", "rough.png", "normals.png"]
+    assert list(scan.files) == [
+        "head.obj",
+        "head materials.mtl",
+        "my head.png",
+        "rough.png",
+        "normals.png",
+    ]
     provenance = json.loads(json.dumps(scan.provenance()))
     assert provenance["files"] == scan.files and provenance["parts"] == {"Skin": "skin"}
-    assert (provenance["unit"], provenance["unit_source"], provenance["up_source"]) == ("mm", "guessed", "guessed")
+    assert (provenance["unit"], provenance["unit_source"], provenance["up_source"]) == (
+        "mm",
+        "guessed",
+        "guessed",
+    )
 
 
 def test_a_bump_map_of_heights_is_not_taken_for_normals(folder):
@@ -405,7 +532,9 @@ def test_a_library_that_is_not_there_is_said_and_names_stay(folder):
 def test_vertex_colours_are_said_to_be_left_out(folder):
     positions, _, faces = ellipsoid()
     text = obj_text(positions, faces)
-    text = "\n".join(line + " 0.5 0.5 0.5" if line.startswith("v ") else line for line in text.splitlines())
+    text = "\n".join(
+        line + " 0.5 0.5 0.5" if line.startswith("v ") else line for line in text.splitlines()
+    )
     assert any("colours per vertex" in note for note in folder({"head.obj": text}).notes)
 
 
@@ -423,14 +552,22 @@ def test_sixteen_bit_grey_is_not_clipped(folder):
 
 
 def heads(*materials: str, last_uvs=lambda uvs: uvs) -> str:
-    """Ellipsoids side by side, 160 mm apart, the middle one of all at 0, each with a material of a.mtl."""
+    """Ellipsoids side by side, 160 mm apart, the middle one of all at 0, each with a material of
+    a.mtl.
+    """
     positions, uvs, faces = ellipsoid()
     lines = ["mtllib a.mtl"]
     for i, material in enumerate(materials):
         own = last_uvs(uvs) if material == materials[-1] else uvs
         moved = positions + (80 * (2 * i + 1 - len(materials)), 0, 0)
-        lines += ["v {} {} {}".format(*p) for p in moved] + ["vt {} {}".format(*t) for t in own] + [f"usemtl {material}"]
-        lines += ["f " + " ".join(f"{c}/{c}" for c in face) for face in faces + 1 + i * len(positions)]
+        lines += (
+            ["v {} {} {}".format(*p) for p in moved]
+            + ["vt {} {}".format(*t) for t in own]
+            + [f"usemtl {material}"]
+        )
+        lines += [
+            "f " + " ".join(f"{c}/{c}" for c in face) for face in faces + 1 + i * len(positions)
+        ]
     return "\n".join(lines)
 
 
@@ -449,19 +586,36 @@ def test_several_textures_become_one_atlas(folder):
     assert scan.part_names == ("one", "two") and any("atlas" in note for note in scan.notes)
     first, second = (np.unique(scan.faces[scan.parts == part]) for part in (0, 1))
     assert (look_up(scan.albedo, scan.uvs[second]) == (9, 99, 199)).all()
-    plain = folder(files | {"two.obj": obj_text(*(ellipsoid()[i] for i in (0, 2, 1)), head="mtllib a.mtl\nusemtl one")})
-    inner = (np.abs(plain.uvs % 0.5 - 0.25) < 0.2).all(axis=1)  # away from the borders of the quarters
-    assert (look_up(scan.albedo, scan.uvs[first][inner]) == look_up(plain.albedo, plain.uvs[inner])).all() and inner.sum() > 100
+    plain = folder(
+        files
+        | {
+            "two.obj": obj_text(
+                *(ellipsoid()[i] for i in (0, 2, 1)), head="mtllib a.mtl\nusemtl one"
+            )
+        }
+    )
+    inner = (np.abs(plain.uvs % 0.5 - 0.25) < 0.2).all(
+        axis=1
+    )  # away from the borders of the quarters
+    assert (
+        look_up(scan.albedo, scan.uvs[first][inner]) == look_up(plain.albedo, plain.uvs[inner])
+    ).all() and inner.sum() > 100
     assert (look_up(scan.normal_map, scan.uvs[first]) == (128, 128, 255)).all()
     assert (look_up(scan.normal_map, scan.uvs[second]) == (100, 100, 240)).all()
 
 
 def test_an_atlas_of_three_has_two_rows(folder):
     colours = {"one": (200, 0, 0), "two": (0, 200, 0), "three": (0, 0, 200)}
-    files = {"three.obj": heads(*colours), "a.mtl": "".join(f"newmtl {name}\nmap_Kd {name}.png\n" for name in colours)}
+    files = {
+        "three.obj": heads(*colours),
+        "a.mtl": "".join(f"newmtl {name}\nmap_Kd {name}.png\n" for name in colours),
+    }
     scan = folder(files | {f"{name}.png": flat_image(colour) for name, colour in colours.items()})
     for part, name in enumerate(scan.part_names):
-        assert (look_up(scan.albedo, scan.uvs[np.unique(scan.faces[scan.parts == part])]) == colours[name]).all()
+        assert (
+            look_up(scan.albedo, scan.uvs[np.unique(scan.faces[scan.parts == part])])
+            == colours[name]
+        ).all()
 
 
 def test_the_atlas_repeats_its_borders_so_that_filtering_does_not_mix_cells(folder):
@@ -474,18 +628,26 @@ def test_the_atlas_repeats_its_borders_so_that_filtering_does_not_mix_cells(fold
     scan = folder(files)
     second = np.unique(scan.faces[scan.parts == 1])
     for step in (-1, 1):
-        assert (look_up(scan.albedo, scan.uvs[second] + step / scan.albedo.shape[1]) == (0, 0, 200)).all()
+        assert (
+            look_up(scan.albedo, scan.uvs[second] + step / scan.albedo.shape[1]) == (0, 0, 200)
+        ).all()
 
 
 def test_a_part_with_a_mere_colour_joins_the_atlas(folder):
     files = {"two.obj": heads("one", "two"), "a.mtl": BOTH + "Kd 0.5 1 0\n", "one.png": quarters()}
     scan = folder(files)
     second = np.unique(scan.faces[scan.parts == 1])
-    assert (look_up(scan.albedo, scan.uvs[second]) == (188, 255, 0)).all()  # sRGB of linear 0.5, as above
+    assert (
+        look_up(scan.albedo, scan.uvs[second]) == (188, 255, 0)
+    ).all()  # sRGB of linear 0.5, as above
 
 
 def test_materials_that_share_their_textures_need_no_atlas(folder):
-    files = {"two.obj": heads("one", "two"), "a.mtl": BOTH + "map_Kd one.png\n", "one.png": quarters()}
+    files = {
+        "two.obj": heads("one", "two"),
+        "a.mtl": BOTH + "map_Kd one.png\n",
+        "one.png": quarters(),
+    }
     scan = folder(files)
     assert scan.albedo.shape == (16, 16, 3) and scan.part_names == ("one", "two")
 
@@ -498,26 +660,50 @@ def test_an_atlas_takes_textures_from_other_tiles_but_not_repeated_ones(folder):
         "two.png": flat_image((0, 0, 200)),
     }
     scan = folder(files)
-    assert (look_up(scan.albedo, scan.uvs[np.unique(scan.faces[scan.parts == 1])]) == (0, 0, 200)).all()
+    assert (
+        look_up(scan.albedo, scan.uvs[np.unique(scan.faces[scan.parts == 1])]) == (0, 0, 200)
+    ).all()
     assert_outward(scan, 0, (-80, 0, 0))
     assert_outward(scan, 1, (80, 0, 0))
-    refused(folder, files | {"two.obj": heads("one", "two", last_uvs=lambda uvs: uvs * 50)}, "'two'", "repeats", "bake")
+    refused(
+        folder,
+        files | {"two.obj": heads("one", "two", last_uvs=lambda uvs: uvs * 50)},
+        "'two'",
+        "repeats",
+        "bake",
+    )
 
 
 def test_a_texture_without_coordinates_is_refused(folder):
     positions, _, faces = ellipsoid()
-    files = {"head.obj": obj_text(positions, faces, head="mtllib a.mtl\nusemtl one"), "a.mtl": BOTH, "one.png": quarters()}
+    files = {
+        "head.obj": obj_text(positions, faces, head="mtllib a.mtl\nusemtl one"),
+        "a.mtl": BOTH,
+        "one.png": quarters(),
+    }
     refused(folder, files, "'one'", "no texture coordinates")
 
 
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        ("M_Face", "skin"), ("Std_Skin_Head", "skin"), ("Material.001", "skin"), ("eyelid", "skin"), ("head", "skin"),
-        ("M_ScleraLeft", "eye"), ("Std_Eye_R", "eye"), ("eyes", "eye"), ("M_Teeth", "mouth"), ("Std_Tongue", "mouth"),
-        ("M_EyeLashes", "hair"), ("Eyebrows", "hair"), ("HAIR_CARDS", "hair"), ("M_EyeOcclusion", "shell"), ("Std_Tearline_L", "shell"),
+        ("M_Face", "skin"),
+        ("Std_Skin_Head", "skin"),
+        ("Material.001", "skin"),
+        ("eyelid", "skin"),
+        ("head", "skin"),
+        ("M_ScleraLeft", "eye"),
+        ("Std_Eye_R", "eye"),
+        ("eyes", "eye"),
+        ("M_Teeth", "mouth"),
+        ("Std_Tongue", "mouth"),
+        ("M_EyeLashes", "hair"),
+        ("Eyebrows", "hair"),
+        ("HAIR_CARDS", "hair"),
+        ("M_EyeOcclusion", "shell"),
+        ("Std_Tearline_L", "shell"),
     ],
-)  # fmt: skip
+)
 def test_what_a_part_is_comes_from_its_name(name, kind):
     assert part_kind(name) == kind
 
@@ -533,7 +719,16 @@ def test_a_head_without_any_part_of_skin_is_skin(folder):
 
 
 @pytest.mark.parametrize(
-    ("scale", "unit"), [(1, "mm"), (0.1, "cm"), (0.001, "m"), (1 / 25.4, "in"), (2.5, "mm"), (0.25, "cm"), (0.0025, "m")]
+    ("scale", "unit"),
+    [
+        (1, "mm"),
+        (0.1, "cm"),
+        (0.001, "m"),
+        (1 / 25.4, "in"),
+        (2.5, "mm"),
+        (0.25, "cm"),
+        (0.0025, "m"),
+    ],
 )
 def test_the_unit_that_makes_a_head_or_bust_is_guessed_and_said(folder, scale, unit):
     positions, _, faces = ellipsoid()
@@ -553,9 +748,15 @@ def test_a_whole_body_is_slender(folder, scale, unit):
 def test_a_given_unit_wins_over_guess_and_format(folder):
     positions, _, faces = ellipsoid()
     scan = folder({"head.obj": obj_text(positions / 10, faces)}, unit="in")
-    assert (scan.unit, scan.unit_source) == ("in", "given") and np.ptp(scan.positions_mm[:, 1]) == pytest.approx(23 * 25.4, rel=1e-5)
-    scan = folder({"head.gltf": gltf_document({"POSITION": positions.astype("<f4")}, faces)}, unit="mm")
-    assert (scan.unit, scan.unit_source) == ("mm", "given") and np.ptp(scan.positions_mm[:, 1]) == pytest.approx(230, rel=1e-5)
+    assert (scan.unit, scan.unit_source) == ("in", "given") and np.ptp(
+        scan.positions_mm[:, 1]
+    ) == pytest.approx(23 * 25.4, rel=1e-5)
+    scan = folder(
+        {"head.gltf": gltf_document({"POSITION": positions.astype("<f4")}, faces)}, unit="mm"
+    )
+    assert (scan.unit, scan.unit_source) == ("mm", "given") and np.ptp(
+        scan.positions_mm[:, 1]
+    ) == pytest.approx(230, rel=1e-5)
 
 
 def test_a_gltf_in_millimetres_breaks_its_format_and_is_guessed(folder):
@@ -566,8 +767,15 @@ def test_a_gltf_in_millimetres_breaks_its_format_and_is_guessed(folder):
 
 def test_a_size_that_fits_no_unit_is_refused(folder):
     positions, _, faces = ellipsoid()
-    refused(folder, {"head.obj": obj_text(positions * 100, faces)}, "2.3e+04 units", "expected 0.12 to 0.9 m")
-    refused(folder, {"head.obj": obj_text(positions, faces)}, "230 m across if its unit is m", unit="m")
+    refused(
+        folder,
+        {"head.obj": obj_text(positions * 100, faces)},
+        "2.3e+04 units",
+        "expected 0.12 to 0.9 m",
+    )
+    refused(
+        folder, {"head.obj": obj_text(positions, faces)}, "230 m across if its unit is m", unit="m"
+    )
     refused(folder, {"head.obj": obj_text(positions / 1e9, faces)}, "no head in")
 
 
@@ -577,11 +785,18 @@ def test_an_obj_with_z_up_is_turned_and_said(folder):
     text = obj_text(standing, faces, uvs, normals=standing)
     scan = folder({"head.obj": text})
     straight = folder({"straight.obj": obj_text(positions, faces, uvs, normals=positions)})
-    assert (scan.up, scan.up_source) == ("z", "guessed") and any("z was taken as up" in note for note in scan.notes)
+    assert (scan.up, scan.up_source) == ("z", "guessed") and any(
+        "z was taken as up" in note for note in scan.notes
+    )
     np.testing.assert_allclose(scan.positions_mm, straight.positions_mm, atol=1e-4)
     np.testing.assert_allclose(scan.normals, straight.normals, atol=1e-5)
-    assert (folder({"head.obj": text}, up="y").up_source, folder({"head.obj": text}, up="y").up) == ("given", "y")
-    assert np.ptp(folder({"straight.obj": obj_text(positions, faces)}, up="z").positions_mm[:, 1]) == pytest.approx(200, abs=2)
+    assert (
+        folder({"head.obj": text}, up="y").up_source,
+        folder({"head.obj": text}, up="y").up,
+    ) == ("given", "y")
+    assert np.ptp(
+        folder({"straight.obj": obj_text(positions, faces)}, up="z").positions_mm[:, 1]
+    ) == pytest.approx(200, abs=2)
 
 
 # Mending
@@ -608,8 +823,13 @@ def test_normals_that_cancel_out_are_those_of_a_face(folder):
     """Two sheets back to back: at the inner point the front's six triangles face the back's six."""
     x, y = (a.reshape(-1) for a in np.meshgrid([-75, 0, 75], [-115, 0, 115]))
     quads = np.array([[i, i + 1, i + 4, i + 3] for i in (0, 1, 3, 4)])
-    front, back = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3), quads[:, [0, 3, 1, 1, 3, 2]].reshape(-1, 3)
-    card = obj_text(np.stack([x, y, 0 * x], axis=1), np.concatenate([front, back]) - 10, head="usemtl Lashes")
+    front, back = (
+        quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3),
+        quads[:, [0, 3, 1, 1, 3, 2]].reshape(-1, 3),
+    )
+    card = obj_text(
+        np.stack([x, y, 0 * x], axis=1), np.concatenate([front, back]) - 10, head="usemtl Lashes"
+    )
     positions, _, faces = ellipsoid()
     text = obj_text(positions, faces, head="usemtl Skin") + card
     scan = folder({"head.obj": text})
@@ -626,7 +846,7 @@ def test_an_open_scan_is_fine(folder):
 
 
 def test_faces_without_area_or_twice_there_are_left_out_and_counted(folder):
-    positions, uvs, faces = ellipsoid()
+    positions, _uvs, faces = ellipsoid()
     broken = np.concatenate([faces, faces[:5], faces[7:9, ::-1], [[3, 3, 4], [3, 4, 3], [5, 5, 5]]])
     scan = folder({"head.obj": obj_text(positions, broken)})
     assert len(scan.faces) == len(faces)
@@ -643,22 +863,32 @@ def fin(positions, faces, count: int = 1):
 
 
 def test_a_non_manifold_edge_is_refused_with_its_place(folder):
-    positions, uvs, faces = ellipsoid()
+    positions, _uvs, faces = ellipsoid()
     finned = fin(positions, faces)
-    message = refused(folder, {"head.obj": obj_text(*finned)}, "not a manifold surface", "1 of its", "more than two faces", "mend it")
+    message = refused(
+        folder,
+        {"head.obj": obj_text(*finned)},
+        "not a manifold surface",
+        "1 of its",
+        "more than two faces",
+        "mend it",
+    )
     assert "(" in message and "mm" in message
     document = gltf_document({"POSITION": metres(finned[0])}, finned[1])
     refused(folder, {"head.gltf": document}, "not a manifold surface")
 
 
 def test_a_few_bad_edges_in_a_large_scan_are_only_said(folder):
-    positions, uvs, faces = ellipsoid(100, 120)  # 35,640 edges: at most 3 may be bad
-    assert any(note.startswith("3 of its") for note in folder({"head.obj": obj_text(*fin(positions, faces, 3))}).notes)
+    positions, _uvs, faces = ellipsoid(100, 120)  # 35,640 edges: at most 3 may be bad
+    assert any(
+        note.startswith("3 of its")
+        for note in folder({"head.obj": obj_text(*fin(positions, faces, 3))}).notes
+    )
     refused(folder, {"head.obj": obj_text(*fin(positions, faces, 4))}, "4 of its")
 
 
 def test_cards_of_hair_are_exempt(folder):
-    positions, uvs, faces = ellipsoid()
+    positions, _uvs, faces = ellipsoid()
     finned, new = fin(positions, faces)
     text = obj_text(positions, faces, head="usemtl Skin")
     text += "usemtl Eyelashes\n" + "\n".join("v {} {} {}".format(*p) for p in finned) + "\n"
@@ -709,27 +939,60 @@ def changed(**changes) -> dict:
         ({"head.obj": "v 0 0 0\nv 1 zero 0\nv 1 1 1\nf 1 2 3"}, ["line 2", "'v 1 zero 0'"]),
         ({"head.obj": TRIANGLE + "v 1 2\x0b3 4\nf 1 2 3"}, ["line 4", "numbers"]),
         ({"head.obj": TRIANGLE + "v 1 2\nf 1 2 3"}, ["line 4", "3 or 4 or 6 or 7 numbers"]),
-        ({"head.obj": "v 0 0 0\nv nan 0 0\nv 0 200 0\nf 1 2 3"}, ["1 positions", "not finite", "nan"]),
+        (
+            {"head.obj": "v 0 0 0\nv nan 0 0\nv 0 200 0\nf 1 2 3"},
+            ["1 positions", "not finite", "nan"],
+        ),
         ({"head.obj": "v 0 0 0\nv 1e999 0 0\nv 0 200 0\nf 1 2 3"}, ["not finite", "inf"]),
         ({"head.obj": TRIANGLE + "vt nan 0\nf 1/1 2/1 3/1"}, ["texture coordinates", "not finite"]),
         ({"head.obj": TRIANGLE + "vt 1e99 0\nf 1/1 2/1 3/1"}, ["absurdly large", "(1e+99, 0)"]),
-        ({"head.obj": "v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\nf 1 1 2"}, ["2 faces", "without area"]),
-        ({"head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3", "a.mtl": "newmtl a\nmap_Kd lost.png\n"}, ["'lost.png'", "not there"]),
-        ({"head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3", "a.mtl": f"newmtl a\nmap_Kd {'long' * 80}\n"}, ["not there"]),
         (
-            {"head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3", "a.mtl": "newmtl a\nmap_Kd -o 0.5 t.png\n", "t.png": quarters()},
+            {"head.obj": "v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\nf 1 1 2"},
+            ["2 faces", "without area"],
+        ),
+        (
+            {
+                "head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3",
+                "a.mtl": "newmtl a\nmap_Kd lost.png\n",
+            },
+            ["'lost.png'", "not there"],
+        ),
+        (
+            {
+                "head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3",
+                "a.mtl": f"newmtl a\nmap_Kd {'long' * 80}\n",
+            },
+            ["not there"],
+        ),
+        (
+            {
+                "head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3",
+                "a.mtl": "newmtl a\nmap_Kd -o 0.5 t.png\n",
+                "t.png": quarters(),
+            },
             ["moves or scales a texture"],
         ),
         (
-            {"head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3", "a.mtl": "newmtl a\nKd 2 0 0\n"},
+            {
+                "head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3",
+                "a.mtl": "newmtl a\nKd 2 0 0\n",
+            },
             ["'Kd 2 0 0'", "0 to 1"],
         ),
         (
-            {"head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3", "a.mtl": "newmtl a\nmap_Kd t.png\n", "t.png": png(quarters())[:60]},
+            {
+                "head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3",
+                "a.mtl": "newmtl a\nmap_Kd t.png\n",
+                "t.png": png(quarters())[:60],
+            },
             ["'t.png'", "cannot be read", "expected a whole"],
         ),
         (
-            {"head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3", "a.mtl": "newmtl a\nmap_Kd t.png\n", "t.png": b"GIMP"},
+            {
+                "head.obj": "mtllib a.mtl\nusemtl a\n" + TRIANGLE + "f 1 2 3",
+                "a.mtl": "newmtl a\nmap_Kd t.png\n",
+                "t.png": b"GIMP",
+            },
             ["'t.png'", "no known image format"],
         ),
         ({"head.glb": b"PK\3\4 and so on and on and on"}, ["not a GLB file"]),
@@ -739,25 +1002,60 @@ def changed(**changes) -> dict:
         ({"head.gltf": "[]"}, ["not valid glTF"]),
         ({"head.gltf": {"asset": {"version": "1.0"}}}, ["glTF of version 1.0", "2.0"]),
         ({"head.gltf": {"asset": {"version": "2.0"}}}, ["no faces"]),
-        ({"head.gltf": changed(extensionsRequired=["KHR_draco_mesh_compression"])}, ["KHR_draco_mesh_compression", "without compression"]),
-        ({"head.gltf": changed(buffers=[{"byteLength": 9, "uri": "head.bin"}])}, ["buffer 'head.bin'", "not there"]),
-        ({"head.gltf": changed(buffers=[{"byteLength": 9, "uri": "data:;base64,AAAA"}])}, ["buffer 0 has 3 bytes", "expected 9"]),
-        ({"head.gltf": changed(buffers=[{"byteLength": 3, "uri": "data:;base64,AAAA"}])}, ["bufferView 0 reaches outside"]),
-        ({"head.gltf": changed(buffers=[{"byteLength": 3, "uri": "data:;base64,A%%A"}])}, ["base64 is damaged"]),
+        (
+            {"head.gltf": changed(extensionsRequired=["KHR_draco_mesh_compression"])},
+            ["KHR_draco_mesh_compression", "without compression"],
+        ),
+        (
+            {"head.gltf": changed(buffers=[{"byteLength": 9, "uri": "head.bin"}])},
+            ["buffer 'head.bin'", "not there"],
+        ),
+        (
+            {"head.gltf": changed(buffers=[{"byteLength": 9, "uri": "data:;base64,AAAA"}])},
+            ["buffer 0 has 3 bytes", "expected 9"],
+        ),
+        (
+            {"head.gltf": changed(buffers=[{"byteLength": 3, "uri": "data:;base64,AAAA"}])},
+            ["bufferView 0 reaches outside"],
+        ),
+        (
+            {"head.gltf": changed(buffers=[{"byteLength": 3, "uri": "data:;base64,A%%A"}])},
+            ["base64 is damaged"],
+        ),
         ({"head.gltf": changed(nodes=[{"mesh": 3}])}, ["meshes[3] of 1"]),
         ({"head.gltf": changed(nodes=[{"children": [0]}])}, ["nodes contain themselves"]),
-        ({"head.gltf": changed(accessors=[a | {"count": 10**9} for a in BASE["accessors"]])}, ["accessor", "1000000000 items"]),
-        ({"head.gltf": changed(accessors=[a | {"sparse": {}} for a in BASE["accessors"]])}, ["sparse"]),
-        ({"head.gltf": gltf_document({"POSITION": metres(ellipsoid()[0][:50])}, ellipsoid()[2])}, ["vertex index", "expected 0 to 49"]),
-        ({"head.gltf": gltf_document({"POSITION": metres(ellipsoid()[0])}, [0, 1, 2, 3])}, ["4 corners", "multiple of 3"]),
         (
-            {"head.gltf": gltf_document({"POSITION": metres(ellipsoid()[0]), "NORMAL": np.ones((3, 3), "<f4")}, ellipsoid()[2])},
+            {"head.gltf": changed(accessors=[a | {"count": 10**9} for a in BASE["accessors"]])},
+            ["accessor", "1000000000 items"],
+        ),
+        (
+            {"head.gltf": changed(accessors=[a | {"sparse": {}} for a in BASE["accessors"]])},
+            ["sparse"],
+        ),
+        (
+            {"head.gltf": gltf_document({"POSITION": metres(ellipsoid()[0][:50])}, ellipsoid()[2])},
+            ["vertex index", "expected 0 to 49"],
+        ),
+        (
+            {"head.gltf": gltf_document({"POSITION": metres(ellipsoid()[0])}, [0, 1, 2, 3])},
+            ["4 corners", "multiple of 3"],
+        ),
+        (
+            {
+                "head.gltf": gltf_document(
+                    {"POSITION": metres(ellipsoid()[0]), "NORMAL": np.ones((3, 3), "<f4")},
+                    ellipsoid()[2],
+                )
+            },
             ["different lengths"],
         ),
         (
             {
                 "head.gltf": gltf_document(
-                    {"POSITION": metres(ellipsoid()[0]), "TEXCOORD_0": ellipsoid()[1].astype("<f4")},
+                    {
+                        "POSITION": metres(ellipsoid()[0]),
+                        "TEXCOORD_0": ellipsoid()[1].astype("<f4"),
+                    },
                     ellipsoid()[2],
                     {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}},
                 )
@@ -785,7 +1083,9 @@ def test_a_missing_file_and_unknown_options_are_refused(tmp_path):
 def test_a_glb_cut_anywhere_is_refused_in_one_line(tmp_path):
     positions, uvs, faces = ellipsoid(6, 8)
     material = PBRMaterial(baseColorTexture=quarters())
-    mesh = trimesh.Trimesh(metres(positions), faces, visual=TextureVisuals(uvs, material=material), process=False)
+    mesh = trimesh.Trimesh(
+        metres(positions), faces, visual=TextureVisuals(uvs, material=material), process=False
+    )
     whole = trimesh.Scene(mesh).export(file_type="glb")
     for end in range(1, len(whole), 61):
         (tmp_path / "head.glb").write_bytes(whole[:end])
@@ -798,7 +1098,9 @@ def test_damage_anywhere_is_read_or_refused_but_never_a_crash(tmp_path, suffix):
     positions, uvs, faces = ellipsoid(6, 8)
     if suffix == "glb":
         material = PBRMaterial(baseColorTexture=quarters())
-        mesh = trimesh.Trimesh(metres(positions), faces, visual=TextureVisuals(uvs, material=material), process=False)
+        mesh = trimesh.Trimesh(
+            metres(positions), faces, visual=TextureVisuals(uvs, material=material), process=False
+        )
         whole = trimesh.Scene(mesh).export(file_type="glb")
     else:
         whole = obj_text(positions, faces, uvs, positions, head="g head").encode()

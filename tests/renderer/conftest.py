@@ -40,12 +40,17 @@ def techniques():
 @pytest.fixture(scope="session")
 def results(frames, techniques):
     """framing -> technique -> Result"""
-    return {f: {t: frame.render(technique) for t, technique in techniques.items()} for f, frame in frames.items()}
+    return {
+        f: {t: frame.render(technique) for t, technique in techniques.items()}
+        for f, frame in frames.items()
+    }
 
 
 @pytest.fixture
 def patch(frames, drawing):
-    """Replaces the head by a flat patch that faces the camera: patch(irradiance (H, W, 3), depth_mm, mask) -> Inputs."""
+    """Replaces the head by a flat patch that faces the camera: patch(irradiance (H, W, 3),
+    depth_mm, mask) -> Inputs.
+    """
 
     def inputs(irradiance, depth_mm=400.0, mask=None):
         drawing.context.make_current()
@@ -56,7 +61,9 @@ def patch(frames, drawing):
         colour = np.dstack([irradiance, mask]).astype(np.float32)[::-1]
         depth = np.zeros((height, width, 4), dtype=np.float32)
         depth[..., 0], depth[..., 3] = depth_mm, 1
-        textures = [gl.Texture(width, height, gl.GL.GL_RGBA32F, data=data) for data in (colour, depth[::-1])]
+        textures = [
+            gl.Texture(width, height, gl.GL.GL_RGBA32F, data=data) for data in (colour, depth[::-1])
+        ]
         return frame.inputs(False, *textures)
 
     return inputs

@@ -17,7 +17,12 @@ from renderer.gl import Program
 def no_skin(result, supersample=2):
     """Output pixels none of whose samples sees scattering material."""
     h, w = result.samples.shape
-    return result.samples.reshape(h // supersample, supersample, w // supersample, supersample).max(axis=(1, 3)) == 0
+    return (
+        result.samples.reshape(h // supersample, supersample, w // supersample, supersample).max(
+            axis=(1, 3)
+        )
+        == 0
+    )
 
 
 def test_where_no_skin_is_seen_all_techniques_agree_to_the_bit(results):
@@ -25,15 +30,23 @@ def test_where_no_skin_is_seen_all_techniques_agree_to_the_bit(results):
         reference = by_name["none"]
         outside = no_skin(reference)
         assert 0.1 < outside.mean() < 0.95, framing
-        eyes_and_hair = outside & (np.abs(reference.image.astype(int) - reference.image[2, 2]).max(axis=2) > 60)
-        assert framing == "half-length" or eyes_and_hair.any(), f"{framing}: no eye or hair pixel checked"
+        eyes_and_hair = outside & (
+            np.abs(reference.image.astype(int) - reference.image[2, 2]).max(axis=2) > 60
+        )
+        assert framing == "half-length" or eyes_and_hair.any(), (
+            f"{framing}: no eye or hair pixel checked"
+        )
         for name, result in by_name.items():
-            np.testing.assert_array_equal(result.image[outside], reference.image[outside], err_msg=f"{framing} {name}")
+            np.testing.assert_array_equal(
+                result.image[outside], reference.image[outside], err_msg=f"{framing} {name}"
+            )
             np.testing.assert_array_equal(no_skin(result), outside)
 
 
 def test_on_skin_every_pair_of_techniques_differs(results):
-    """No technique is another under a second name; golubev_plus is close to golubev, none is far from all."""
+    """No technique is another under a second name; golubev_plus is close to golubev, none is far
+    from all.
+    """
     close = results["close-up"]
     skin = ~no_skin(close["none"])
 
@@ -48,12 +61,12 @@ def test_on_skin_every_pair_of_techniques_differs(results):
 
 
 def test_samples_are_counted(results):
-    for framing, by_name in results.items():
+    for _framing, by_name in results.items():
         assert set(np.unique(by_name["none"].samples)) == {0, 1}
         assert set(np.unique(by_name["golubev"].samples)) == {0, 22}
         plus = by_name["golubev_plus"]
         assert set(np.unique(plus.samples)) == {0, 12, 22}
-        assert plus.contrast is not None and 0 <= plus.contrast.min() and plus.contrast.max() <= 1
+        assert plus.contrast is not None and plus.contrast.min() >= 0 and plus.contrast.max() <= 1
         np.testing.assert_array_equal(plus.samples == 22, plus.contrast >= 0.25)
         assert by_name["golubev"].contrast is None
 
@@ -88,9 +101,30 @@ def rendered(platform, folder):
     folder.mkdir()
     files = [folder / name for name in ("image.png", "samples.npy", "contrast.png")]
     run = subprocess.run(
-        [sys.executable, "-m", "app.cli", "render", "-t", "golubev_plus", "-f", "head-shot", "-s", "160x90", "--supersample", "1",
-         "-o", files[0], "--samples", files[1], "--contrast", files[2]],
-        env={**os.environ, "PYOPENGL_PLATFORM": platform}, capture_output=True, text=True)
+        [
+            sys.executable,
+            "-m",
+            "app.cli",
+            "render",
+            "-t",
+            "golubev_plus",
+            "-f",
+            "head-shot",
+            "-s",
+            "160x90",
+            "--supersample",
+            "1",
+            "-o",
+            files[0],
+            "--samples",
+            files[1],
+            "--contrast",
+            files[2],
+        ],
+        env={**os.environ, "PYOPENGL_PLATFORM": platform},
+        capture_output=True,
+        text=True,
+    )
     assert run.returncode == 0, run.stderr
     return files
 
@@ -107,24 +141,30 @@ def test_command_line_writes_image_samples_and_contrast(by_egl):
     assert samples.shape == (90, 160) and set(np.unique(samples)) == {0, 12, 22}
 
 
-@pytest.mark.skipif(find_library("OSMesa") is None, reason="this distribution has no libosmesa6 (Mesa dropped it in 25.1)")
+@pytest.mark.skipif(
+    find_library("OSMesa") is None,
+    reason="this distribution has no libosmesa6 (Mesa dropped it in 25.1)",
+)
 def test_egl_and_osmesa_give_the_same_bytes(by_egl, tmp_path):
     for one, other in zip(by_egl, rendered("osmesa", tmp_path / "osmesa"), strict=True):
         assert one.read_bytes() == other.read_bytes(), one.name
 
 
-@pytest.mark.parametrize("arguments, words", [
-    (["-t", "golub", "-o", "a.png"], "no technique 'golub'"),
-    (["-t", "none", "-f", "far", "-o", "a.png"], "no framing 'far'"),
-    (["-t", "none", "-s", "big", "-o", "a.png"], "expected WIDTHxHEIGHT"),
-    (["-t", "none", "-o", "a.jpg"], "expected a file name that ends in .png"),
-    (["-t", "none", "-o", "nowhere/a.png"], "there is no folder"),
-    (["-t", "none", "-o", "a.png", "--contrast", "c.png"], "measures no contrast"),
-    (["-t", "golubev", "-p", "samples=0", "-o", "a.png"], "golubev.samples is 0"),
-    (["-t", "golubev", "-p", "samples", "-o", "a.png"], "expected NAME=VALUE"),
-    (["-t", "none", "--head", "gone.obj", "-o", "a.png"], "gone.obj"),
-    (["-t", "none"], "--out"),
-])
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["-t", "golub", "-o", "a.png"], "no technique 'golub'"),
+        (["-t", "none", "-f", "far", "-o", "a.png"], "no framing 'far'"),
+        (["-t", "none", "-s", "big", "-o", "a.png"], "expected WIDTHxHEIGHT"),
+        (["-t", "none", "-o", "a.jpg"], "expected a file name that ends in .png"),
+        (["-t", "none", "-o", "nowhere/a.png"], "there is no folder"),
+        (["-t", "none", "-o", "a.png", "--contrast", "c.png"], "measures no contrast"),
+        (["-t", "golubev", "-p", "samples=0", "-o", "a.png"], "golubev.samples is 0"),
+        (["-t", "golubev", "-p", "samples", "-o", "a.png"], "expected NAME=VALUE"),
+        (["-t", "none", "--head", "gone.obj", "-o", "a.png"], "gone.obj"),
+        (["-t", "none"], "--out"),
+    ],
+)
 def test_command_line_refuses_in_one_line(arguments, words, capsys, tmp_path, monkeypatch):
     from app.cli import main
 
@@ -138,7 +178,10 @@ def test_command_line_refuses_in_one_line(arguments, words, capsys, tmp_path, mo
 def test_times_are_taken_of_every_technique(frames, techniques):
     spent = frames["head-shot"].time(techniques, 2)
     assert spent.keys() == techniques.keys()
-    assert all(times.shape == (2, 2) and (times[:, 0] > 0).all() and (times >= 0).all() for times in spent.values())
+    assert all(
+        times.shape == (2, 2) and (times[:, 0] > 0).all() and (times >= 0).all()
+        for times in spent.values()
+    )
 
 
 def test_sizes_out_of_range_are_refused(model):

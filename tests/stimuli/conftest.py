@@ -1,4 +1,6 @@
-"""A small study of ready-made images, and a renderer that draws coloured rectangles instead of heads."""
+"""A small study of ready-made images, and a renderer that draws coloured rectangles instead of
+heads.
+"""
 
 import hashlib
 import json
@@ -81,7 +83,10 @@ def ready_made(tmp_path):
             "version": 1,
             "seed": 11,
             "framings": [{"name": "near", "label": "Near"}, {"name": "far", "label": "Far"}],
-            "techniques": [{"name": "unreal", "label": "Unreal"}, {"name": "blender", "label": "Blender"}],
+            "techniques": [
+                {"name": "unreal", "label": "Unreal"},
+                {"name": "blender", "label": "Blender"},
+            ],
         },
         "images": images,
     }
@@ -115,7 +120,9 @@ def make(technique, parameters):
 
 @dataclass
 class FakeRenderer:
-    """Draws a colour that depends on all that an image should depend on; `drawn` counts the images."""
+    """Draws a colour that depends on all that an image should depend on; `drawn` counts the
+    images.
+    """
 
     model: str
     size: tuple
@@ -147,7 +154,10 @@ class FakeRenderer:
             return SimpleNamespace(image=image, samples=np.array([[0, 4], [0, 9]], np.uint8))
 
         def time(techniques, rounds):
-            return {name: np.tile([0.002 * (k + 1), 9.0], (rounds, 1)) for k, name in enumerate(techniques)}
+            return {
+                name: np.tile([0.002 * (k + 1), 9.0], (rounds, 1))
+                for k, name in enumerate(techniques)
+            }
 
         return SimpleNamespace(render=render, time=time)
 
@@ -155,7 +165,11 @@ class FakeRenderer:
 @pytest.fixture
 def fake_renderer(monkeypatch):
     """Puts the fake in the place of the renderer and of the heads, and returns its class."""
-    renderer, errors, heads = ModuleType("renderer"), ModuleType("renderer.errors"), ModuleType("stimuli.heads")
+    renderer, errors, heads = (
+        ModuleType("renderer"),
+        ModuleType("renderer.errors"),
+        ModuleType("stimuli.heads"),
+    )
     errors.InputError = FakeInputError
     renderer.errors, renderer.VERSION, renderer.Renderer = errors, "1", FakeRenderer
     renderer.make, renderer.FRAMINGS = make, {"near": 1, "far": 2}

@@ -1,7 +1,8 @@
-"""The build, with a renderer that draws coloured rectangles: what it renders, keeps, writes and refuses."""
+"""The build, with a renderer that draws coloured rectangles: what it renders, keeps, writes and
+refuses.
+"""
 
 import dataclasses
-import json
 import os
 import shutil
 import subprocess
@@ -23,7 +24,11 @@ def built(rendered, kept):
 
 
 def contents(folder):
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 @pytest.fixture
@@ -40,7 +45,9 @@ def test_manifest_tells_how_each_image_was_made(small_study, fake_renderer, out)
     assert image.sha256 == sha256(image.path) and PIL.Image.open(image.path).size == (32, 18)
     assert image.parameters == {"technique": "blur", "supersample": 1, "radius_mm": 2.5}
     assert image.seed == 5
-    assert image.measures == {"samples_per_pixel": 6.5}  # of 4 and 9; nothing is scattered where there are 0
+    assert image.measures == {
+        "samples_per_pixel": 6.5
+    }  # of 4 and 9; nothing is scattered where there are 0
     assert image.renderer == {"version": "1", "gl_vendor": "fake", "commit": stimuli.build.commit()}
     assert image.head == {"source": "a sphere"}
     assert manifest.licences[0]["licence"] == "CC0-1.0"
@@ -89,14 +96,18 @@ def test_changed_parameters_render_that_technique_alone(write_toml, fake_rendere
 
 def test_new_wording_renders_nothing_but_reaches_the_manifest(small_study, fake_renderer, out):
     build(small_study, out)
-    assert build(dataclasses.replace(small_study, title="Which is softer?", seed=8), out) == built(0, 4)
+    assert build(dataclasses.replace(small_study, title="Which is softer?", seed=8), out) == built(
+        0, 4
+    )
     assert load_manifest(out).study.title == "Which is softer?"
 
 
 @pytest.mark.parametrize("change", [{"size": (34, 18)}, {"supersample": 2}, {"seed": 6}])
 def test_other_rendering_renders_everything(small_study, fake_renderer, out, change):
     build(small_study, out)
-    study = dataclasses.replace(small_study, render=dataclasses.replace(small_study.render, **change))
+    study = dataclasses.replace(
+        small_study, render=dataclasses.replace(small_study.render, **change)
+    )
     assert build(study, out) == built(4, 0)
     load_manifest(out)
 
@@ -160,14 +171,18 @@ def test_only_its_own_strays_are_removed(small_study, fake_renderer, out):
     (out / "study.sqlite3").write_bytes(b"answers")
     near_only = dataclasses.replace(small_study, framings=small_study.framings[:1])
     assert build(near_only, out) == built(0, 2)
-    assert sorted(path.name for path in (out / "images").iterdir()) == sorted([*IMAGES[:3], "mine.png"])
+    assert sorted(path.name for path in (out / "images").iterdir()) == sorted(
+        [*IMAGES[:3], "mine.png"]
+    )
     assert (out / "study.sqlite3").read_bytes() == b"answers"
     assert len(load_manifest(out).images) == 2
 
 
 def test_manifest_of_ready_made_images_is_not_overwritten(small_study, fake_renderer, ready_made):
     before = contents(ready_made)
-    with pytest.raises(InputError, match="manifest.json: not written by a build, and not overwritten"):
+    with pytest.raises(
+        InputError, match="manifest.json: not written by a build, and not overwritten"
+    ):
         build(small_study, ready_made, force=True)
     assert contents(ready_made) == before
 
@@ -188,7 +203,9 @@ def test_foreign_record_is_refused(small_study, fake_renderer, out, text):
         ("2.5", "-2.5", r"techniques\[1\]: radius_mm: got -2.5, expected > 0"),
     ],
 )
-def test_what_the_renderer_does_not_know_is_named_before_anything_is_written(write_toml, fake_renderer, out, old, new, message):
+def test_what_the_renderer_does_not_know_is_named_before_anything_is_written(
+    write_toml, fake_renderer, out, old, new, message
+):
     path = write_toml(write_toml().read_text().replace(old, new))
     with pytest.raises(InputError, match=message):
         build(load_study(path), out)
@@ -196,17 +213,27 @@ def test_what_the_renderer_does_not_know_is_named_before_anything_is_written(wri
 
 
 def test_renderer_that_returns_another_size_is_a_defect(small_study, fake_renderer, out):
-    study = dataclasses.replace(small_study, render=dataclasses.replace(small_study.render, size=(40, 20)))
+    study = dataclasses.replace(
+        small_study, render=dataclasses.replace(small_study.render, size=(40, 20))
+    )
     with pytest.raises(RuntimeError, match=r"rendered \(18, 32, 3\)"):
-        stimuli.build._write_png(out, fake_renderer("sphere", (32, 18), 1, 0).frame("near").render(None).image, study.render.size)
+        stimuli.build._write_png(
+            out,
+            fake_renderer("sphere", (32, 18), 1, 0).frame("near").render(None).image,
+            study.render.size,
+        )
 
 
 def test_commit_of_a_checkout(tmp_path, monkeypatch):
-    """The commit, "-dirty" when tracked source differs, nothing outside a checkout or below its top."""
+    """The commit, "-dirty" when tracked source differs, nothing outside a checkout or below its
+    top.
+    """
 
     def git(*args):
         identity = ["-c", "user.name=n", "-c", "user.email=e@example.org"]
-        return subprocess.run(["git", "-C", tmp_path, *identity, *args], check=True, capture_output=True, text=True).stdout
+        return subprocess.run(
+            ["git", "-C", tmp_path, *identity, *args], check=True, capture_output=True, text=True
+        ).stdout
 
     monkeypatch.setattr(stimuli.build, "_ROOT", tmp_path)
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))

@@ -16,7 +16,11 @@ from stimuli.study import THESIS, load_study
 def thesis_in_small(tmp_path_factory):
     path = tmp_path_factory.mktemp("study") / "small.toml"
     text = THESIS.read_text()
-    for old, new in (("[1920, 1080]", "[160, 90]"), ("supersample = 2", "supersample = 1"), ("seed = 0 ", "seed = 3 ")):
+    for old, new in (
+        ("[1920, 1080]", "[160, 90]"),
+        ("supersample = 2", "supersample = 1"),
+        ("seed = 0 ", "seed = 3 "),
+    ):
         assert old in text
         text = text.replace(old, new)
     path.write_text(text)
@@ -33,9 +37,13 @@ def folder(thesis_in_small, tmp_path_factory):
 def test_manifest_of_the_thesis_study(folder):
     manifest = load_manifest(folder)
     assert len(manifest.images) == 15
-    assert {image.parameters["technique"] for image in manifest.images} == {t.name for t in manifest.study.techniques}
+    assert {image.parameters["technique"] for image in manifest.images} == {
+        t.name for t in manifest.study.techniques
+    }
     for image in manifest.images:
-        assert {"version", "commit", "gl_vendor", "gl_renderer", "gl_version", "platform"} <= set(image.renderer)
+        assert {"version", "commit", "gl_vendor", "gl_renderer", "gl_version", "platform"} <= set(
+            image.renderer
+        )
         assert image.head and image.seed == 3
     assert manifest.licences and all(licence["licence"] for licence in manifest.licences)
     assert "CC0-1.0" in {licence["licence"] for licence in manifest.licences}
@@ -45,9 +53,12 @@ def test_conditions_are_different_pictures_of_one_scene(folder):
     """Each framing's five images differ, and differ little: what changes is scattering alone."""
     manifest = load_manifest(folder)
     for framing in manifest.study.framings:
-        pixels = [np.asarray(PIL.Image.open(manifest.image(framing.name, t.name).path), float) for t in manifest.study.techniques]
+        pixels = [
+            np.asarray(PIL.Image.open(manifest.image(framing.name, t.name).path), float)
+            for t in manifest.study.techniques
+        ]
         apart = [np.abs(a - b).mean() for i, a in enumerate(pixels) for b in pixels[:i]]
-        assert 0 < min(apart) and max(apart) < 0.1 * 255
+        assert min(apart) > 0 and max(apart) < 0.1 * 255
 
 
 def test_two_builds_with_one_seed_give_the_same_bytes(thesis_in_small, folder, tmp_path):
@@ -57,9 +68,13 @@ def test_two_builds_with_one_seed_give_the_same_bytes(thesis_in_small, folder, t
     assert run.returncode == 0, run.stderr
     assert run.stdout == f"{tmp_path}: 15 images, 15 rendered, 0 up to date\n"
     names = sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
-    assert names == sorted(path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file())
+    assert names == sorted(
+        path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()
+    )
     assert len(names) == 17
-    assert not [name for name in names if (folder / name).read_bytes() != (tmp_path / name).read_bytes()]
+    assert not [
+        name for name in names if (folder / name).read_bytes() != (tmp_path / name).read_bytes()
+    ]
 
 
 def test_second_build_renders_nothing(thesis_in_small, folder):

@@ -16,7 +16,9 @@ TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_g
 @pytest.mark.parametrize("framings", [FRAMINGS[:n] for n in (1, 2, 3)])
 @pytest.mark.parametrize("techniques", [TECHNIQUES[:n] for n in (2, 3, 5)])
 def test_every_pair_once_within_each_framing(framings, techniques):
-    expected = Counter((framing, frozenset(pair)) for framing in framings for pair in combinations(techniques, 2))
+    expected = Counter(
+        (framing, frozenset(pair)) for framing in framings for pair in combinations(techniques, 2)
+    )
     for participant in range(20):
         drawn = trials(framings, techniques, 3, participant)
         assert Counter((t.framing, frozenset((t.left, t.right))) for t in drawn) == expected
@@ -32,12 +34,18 @@ def test_seed_and_participant_alone_decide():
     first = trials(FRAMINGS, TECHNIQUES, 42, 7)
     np.random.seed(2)
     assert trials(list(FRAMINGS), list(TECHNIQUES), 42, 7) == first
-    others = [trials(FRAMINGS, TECHNIQUES, 42, 8), trials(FRAMINGS, TECHNIQUES, 43, 7), trials(FRAMINGS, TECHNIQUES, 7, 42)]
+    others = [
+        trials(FRAMINGS, TECHNIQUES, 42, 8),
+        trials(FRAMINGS, TECHNIQUES, 43, 7),
+        trials(FRAMINGS, TECHNIQUES, 7, 42),
+    ]
     assert first not in others
 
 
 def test_trials_stay_the_same_over_versions():
-    """Recorded from this implementation (PCG64 raw words, seed 1, participant 1): published lists must stay."""
+    """Recorded from this implementation (PCG64 raw words, seed 1, participant 1): published lists
+    must stay.
+    """
     assert trials(("near", "far"), ("a", "b", "c"), 1, 1) == [
         Trial(1, "far", "b", "c"),
         Trial(2, "far", "a", "b"),
@@ -49,7 +57,9 @@ def test_trials_stay_the_same_over_versions():
 
 
 def test_sides_are_balanced_over_participants():
-    """Per pair and framing, the first technique is left as often as a fair coin says (exact test, Bonferroni)."""
+    """Per pair and framing, the first technique is left as often as a fair coin says (exact test,
+    Bonferroni).
+    """
     participants = 400
     left = Counter()
     for participant in range(participants):
@@ -65,7 +75,13 @@ def test_orders_are_uniform_over_participants():
     places = Counter()
     for participant in range(3000):
         drawn = trials(FRAMINGS, TECHNIQUES, 5, participant)
-        places[next(t.order for t in drawn if t.framing == "head-shot" and {t.left, t.right} == {"none", "golubev"})] += 1
+        places[
+            next(
+                t.order
+                for t in drawn
+                if t.framing == "head-shot" and {t.left, t.right} == {"none", "golubev"}
+            )
+        ] += 1
     assert chisquare([places[order] for order in range(1, 31)]).pvalue > 0.001
 
 

@@ -39,7 +39,11 @@ def test_ready_made_images_are_a_study(ready_made):
 
 def test_own_question_and_scale_are_kept(change):
     def ask(value):
-        value["study"]["question"] = {"text": "Which is softer?", "left_label": "Left", "right_label": "Right"}
+        value["study"]["question"] = {
+            "text": "Which is softer?",
+            "left_label": "Left",
+            "right_label": "Right",
+        }
         value["study"]["scale"] = [{"value": v, "label": f"{v:+d}"} for v in range(-2, 3)]
 
     study = load_manifest(change(ask)).study
@@ -50,27 +54,69 @@ def test_own_question_and_scale_are_kept(change):
 @pytest.mark.parametrize(
     ("by", "message"),
     [
-        (lambda m: m.update(format="other/1"), r"format: got 'other/1', expected 'subdermal-manifest/1'"),
+        (
+            lambda m: m.update(format="other/1"),
+            r"format: got 'other/1', expected 'subdermal-manifest/1'",
+        ),
         (lambda m: m.update(extra=1), r"extra: unknown key"),
         (lambda m: m.pop("study"), r"study: missing, expected a table"),
         (lambda m: m["study"].pop("title"), r"study\.title: missing"),
         (lambda m: m["study"].update(render={}), r"study\.render: unknown key"),
-        (lambda m: m["study"]["techniques"][0].update(label=""), r"study\.techniques\[0\]\.label: got ''"),
+        (
+            lambda m: m["study"]["techniques"][0].update(label=""),
+            r"study\.techniques\[0\]\.label: got ''",
+        ),
         (lambda m: m.update(images=[]), r"images: got \[\], expected a list of at least 1 tables"),
-        (lambda m: m["images"][0].update(measures={"ms": 1}), r"images\[0\]\.measures\.ms: unknown key"),
-        (lambda m: m["images"][0].update(measures={"dssim": -1}), r"images\[0\]\.measures\.dssim: got -1, expected a number from 0"),
+        (
+            lambda m: m["images"][0].update(measures={"ms": 1}),
+            r"images\[0\]\.measures\.ms: unknown key",
+        ),
+        (
+            lambda m: m["images"][0].update(measures={"dssim": -1}),
+            r"images\[0\]\.measures\.dssim: got -1, expected a number from 0",
+        ),
         (lambda m: m["images"].pop(), r"images: none of blender at far"),
-        (lambda m: m["images"].append(dict(m["images"][0], file="x.png")), r"images\[4\]: a second image of unreal at near"),
-        (lambda m: m["images"][1].update(file="near-unreal.png"), r"images\[1\]\.file: .* differs from that of images\[0\]"),
-        (lambda m: m["images"][1].update(technique="unity"), r"images\[1\]\.technique: got 'unity', expected one of unreal"),
-        (lambda m: m["images"][0].update(file="../near-unreal.png"), r"images\[0\]\.file: .* inside the study's folder"),
-        (lambda m: m["images"][0].update(file="/etc/passwd.png"), r"images\[0\]\.file: .* inside the study's folder"),
+        (
+            lambda m: m["images"].append(dict(m["images"][0], file="x.png")),
+            r"images\[4\]: a second image of unreal at near",
+        ),
+        (
+            lambda m: m["images"][1].update(file="near-unreal.png"),
+            r"images\[1\]\.file: .* differs from that of images\[0\]",
+        ),
+        (
+            lambda m: m["images"][1].update(technique="unity"),
+            r"images\[1\]\.technique: got 'unity', expected one of unreal",
+        ),
+        (
+            lambda m: m["images"][0].update(file="../near-unreal.png"),
+            r"images\[0\]\.file: .* inside the study's folder",
+        ),
+        (
+            lambda m: m["images"][0].update(file="/etc/passwd.png"),
+            r"images\[0\]\.file: .* inside the study's folder",
+        ),
         (lambda m: m["images"][0].update(file="near.svg"), r"images\[0\]\.file: .* ends in .png"),
-        (lambda m: m["images"][0].update(file="gone.png"), r"images\[0\]\.file: got 'gone.png', expected a file that is there"),
-        (lambda m: m["images"][0].update(sha256="0" * 64), r"images\[0\]\.sha256: .* changed after the manifest"),
-        (lambda m: m["images"][0].update(sha256="0"), r"images\[0\]\.sha256: got '0', expected 64 hexadecimal digits"),
-        (lambda m: m["images"][0].update(width=13), r"images\[1\]\.width, height: got \(12, 8\), expected \(13, 8\), as the other"),
-        (lambda m: [i.update(width=7) for i in m["images"][2:]], r"images\[2\]\.width, height: .* expected \(6, 4\), the size of"),
+        (
+            lambda m: m["images"][0].update(file="gone.png"),
+            r"images\[0\]\.file: got 'gone.png', expected a file that is there",
+        ),
+        (
+            lambda m: m["images"][0].update(sha256="0" * 64),
+            r"images\[0\]\.sha256: .* changed after the manifest",
+        ),
+        (
+            lambda m: m["images"][0].update(sha256="0"),
+            r"images\[0\]\.sha256: got '0', expected 64 hexadecimal digits",
+        ),
+        (
+            lambda m: m["images"][0].update(width=13),
+            r"images\[1\]\.width, height: got \(12, 8\), expected \(13, 8\), as the other",
+        ),
+        (
+            lambda m: [i.update(width=7) for i in m["images"][2:]],
+            r"images\[2\]\.width, height: .* expected \(6, 4\), the size of",
+        ),
         (lambda m: m.update(licences=[{"what": "x"}]), r"licences\[0\]\.licence: missing"),
     ],
 )
@@ -97,11 +143,15 @@ def test_file_that_is_no_image(change, ready_made):
 
 
 def test_no_manifest_names_the_command_that_writes_one(tmp_path):
-    with pytest.raises(InputError, match="manifest.json: not there; `subdermal build STUDY.toml --out"):
+    with pytest.raises(
+        InputError, match="manifest.json: not there; `subdermal build STUDY.toml --out"
+    ):
         load_manifest(tmp_path)
 
 
-@pytest.mark.parametrize(("text", "message"), [("{", "not JSON"), ("[]", "got list, expected a table")])
+@pytest.mark.parametrize(
+    ("text", "message"), [("{", "not JSON"), ("[]", "got list, expected a table")]
+)
 def test_no_table(tmp_path, text, message):
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(InputError, match=message):

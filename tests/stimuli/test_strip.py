@@ -14,14 +14,23 @@ def test_columns_are_the_conditions_pixel_for_pixel(ready_made):
     manifest = load_manifest(ready_made)
     framing = manifest.study.framings[0].name
     width, height = manifest.images[0].width, manifest.images[0].height
-    sheet = np.asarray(strip(ready_made, framing, [(2, 1, width - 4, height - 3), (0, 0, width - 4, 4)]))
+    sheet = np.asarray(
+        strip(ready_made, framing, [(2, 1, width - 4, height - 3), (0, 0, width - 4, 4)])
+    )
     for k, condition in enumerate(manifest.study.techniques):
-        image = next(i for i in manifest.images if (i.framing, i.technique) == (framing, condition.name))
+        image = next(
+            i for i in manifest.images if (i.framing, i.technique) == (framing, condition.name)
+        )
         pixels = np.asarray(PIL.Image.open(image.path).convert("RGB"))
         left = k * (width - 4 + GAP_PX)
-        np.testing.assert_array_equal(sheet[BAND_PX : BAND_PX + height - 3, left : left + width - 4], pixels[1 : height - 2, 2 : width - 2])
+        np.testing.assert_array_equal(
+            sheet[BAND_PX : BAND_PX + height - 3, left : left + width - 4],
+            pixels[1 : height - 2, 2 : width - 2],
+        )
         second = BAND_PX + height - 3 + GAP_PX
-        np.testing.assert_array_equal(sheet[second : second + 4, left : left + width - 4], pixels[:4, : width - 4])
+        np.testing.assert_array_equal(
+            sheet[second : second + 4, left : left + width - 4], pixels[:4, : width - 4]
+        )
 
 
 @pytest.mark.parametrize("text", ["", "10", "10x10", "0x10+1+1", "axb+1+1", "10x10-1+1"])

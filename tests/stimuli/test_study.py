@@ -10,7 +10,9 @@ from stimuli.table import Table
 
 
 def test_thesis_study():
-    """Chapter 4 of the thesis: five conditions at three framings; the order is that of its matrices."""
+    """Chapter 4 of the thesis: five conditions at three framings; the order is that of its
+    matrices.
+    """
     study = load_study(THESIS)
     assert [framing.name for framing in study.framings] == ["close-up", "head-shot", "half-length"]
     assert [(condition.name, condition.label) for condition in study.techniques] == [
@@ -48,13 +50,20 @@ def test_record_is_read_back(small_study):
 
 def test_what_is_declared_of_the_analysis_is_kept_as_written(small_study, write_toml):
     assert small_study.analysis == {} and "analysis" not in small_study.record()
-    study = load_study(write_toml(write_toml().read_text() + "\n[analysis]\nmargin = 0.3\n[analysis.exclusions]\nzeta = false\n"))
+    study = load_study(
+        write_toml(
+            write_toml().read_text()
+            + "\n[analysis]\nmargin = 0.3\n[analysis.exclusions]\nzeta = false\n"
+        )
+    )
     assert study.analysis == {"margin": 0.3, "exclusions": {"zeta": False}}
     assert read_study(Table(study.record(), "manifest")).analysis == study.analysis
 
 
 def test_head_file_lies_beside_the_study(write_toml):
-    path = write_toml(write_toml().read_text() + '\n[head]\nname = "scan.glb"\nunit = "cm"\nup = "z"\n')
+    path = write_toml(
+        write_toml().read_text() + '\n[head]\nname = "scan.glb"\nunit = "cm"\nup = "z"\n'
+    )
     assert load_study(path).head == HeadChoice(str(path.parent / "scan.glb"), "cm", "z")
 
 
@@ -63,37 +72,107 @@ def test_head_file_lies_beside_the_study(write_toml):
     [
         ('name = "small"', 'name = "small', r"line 2"),
         ('name = "small"', "", r"name: missing, expected a name"),
-        ('name = "small"', 'name = "Small one"', r"name: got 'Small one', expected a name of small letters"),
-        ('title = "Which is rounder?"', 'title = " "', r"title: got ' ', expected a text that is not blank"),
+        (
+            'name = "small"',
+            'name = "Small one"',
+            r"name: got 'Small one', expected a name of small letters",
+        ),
+        (
+            'title = "Which is rounder?"',
+            'title = " "',
+            r"title: got ' ', expected a text that is not blank",
+        ),
         ("version = 3", "version = true", r"version: got True, expected an integer from 1"),
         ("seed = 7", "seed = -1", r"seed: got -1, expected an integer from 0"),
         ("seed = 7", "sede = 7", r"seed: missing"),
-        ("seed = 7", "seed = 7\nquestions = 1", r"questions: unknown key, did you mean 'question'\?"),
+        (
+            "seed = 7",
+            "seed = 7\nquestions = 1",
+            r"questions: unknown key, did you mean 'question'\?",
+        ),
         ("[32, 18]", "[32]", r"render\.size: got \[32\], expected \[width, height\] in pixels"),
         ("[32, 18]", "[32.0, 18]", r"render\.size: got"),
-        ("supersample = 1", "supersample = 0", r"render\.supersample: got 0, expected an integer from 1 to 4"),
+        (
+            "supersample = 1",
+            "supersample = 0",
+            r"render\.supersample: got 0, expected an integer from 1 to 4",
+        ),
         ("supersample = 1", "samples = 1", r"render\.samples: unknown key"),
-        ('name = "far"', 'name = "near"', r"framings\[1\]\.name: got 'near', expected a value that differs from framings\[0\]"),
-        ('label = "Soft"', 'label = "Plain"', r"techniques\[1\]\.label: got 'Plain', expected a value that differs"),
-        ('technique = "blur"', "technique = 3", r"techniques\[1\]\.technique: got 3, expected a name"),
+        (
+            'name = "far"',
+            'name = "near"',
+            r"framings\[1\]\.name: got 'near', expected a value that differs from framings\[0\]",
+        ),
+        (
+            'label = "Soft"',
+            'label = "Plain"',
+            r"techniques\[1\]\.label: got 'Plain', expected a value that differs",
+        ),
+        (
+            'technique = "blur"',
+            "technique = 3",
+            r"techniques\[1\]\.technique: got 3, expected a name",
+        ),
         ("{ radius_mm = 2.5 }", "2.5", r"techniques\[1\]\.parameters: got 2\.5, expected a table"),
-        ('label = "Soft"', 'label = "Soft"\nparams = {}', r"techniques\[1\]\.params: unknown key, did you mean 'parameters'"),
-        ("[render]", '[question]\ntext = "?"\nleft_label = "A"\n[render]', r"question\.right_label: missing"),
+        (
+            'label = "Soft"',
+            'label = "Soft"\nparams = {}',
+            r"techniques\[1\]\.params: unknown key, did you mean 'parameters'",
+        ),
+        (
+            "[render]",
+            '[question]\ntext = "?"\nleft_label = "A"\n[render]',
+            r"question\.right_label: missing",
+        ),
         ("[render]", "scale = 5\n[render]", r"scale: got 5, expected a list of 5 tables"),
         (
             "[render]",
-            "scale = [" + ", ".join(f'{{value = {v}, label = "{v}"}}' for v in (-2, -1, 0, 2, 1)) + "]\n[render]",
+            "scale = ["
+            + ", ".join(f'{{value = {v}, label = "{v}"}}' for v in (-2, -1, 0, 2, 1))
+            + "]\n[render]",
             r"scale\[3\]\.value: got 2, expected 1",
         ),
-        ("[render]", '[familiarity]\nquestion = "?"\nlabels = ["a", "b"]\n[render]', r"familiarity\.labels: .* 5 texts"),
-        ("[render]", '[head]\nunit = "ft"\n[render]', r"head\.unit: got 'ft', expected one of mm, cm, m, in"),
+        (
+            "[render]",
+            '[familiarity]\nquestion = "?"\nlabels = ["a", "b"]\n[render]',
+            r"familiarity\.labels: .* 5 texts",
+        ),
+        (
+            "[render]",
+            '[head]\nunit = "ft"\n[render]',
+            r"head\.unit: got 'ft', expected one of mm, cm, m, in",
+        ),
         ("[render]", '[head]\nname = ""\n[render]', r"head\.name: got ''"),
-        ("[render]", "[analysis]\nmargins = 1\n[render]", r"analysis\.margins: unknown key, did you mean 'margin'"),
-        ("[render]", "[analysis]\nmargin = 0\n[render]", r"analysis\.margin: got 0, expected a number from 0\.001 to 4"),
-        ("[render]", "[analysis]\nmargin = true\n[render]", r"analysis\.margin: got True, expected a number"),
-        ("[render]", '[analysis]\ntest = "t"\n[render]', r"analysis\.test: got 't', expected one of wilcoxon, sign"),
-        ("[render]", "[analysis.exclusions]\nzeta = 2\n[render]", r"analysis\.exclusions\.zeta: got 2, expected a number from -1 to 1"),
-        ("[render]", "[analysis.exclusions]\nspeed = 2\n[render]", r"analysis\.exclusions\.speed: unknown key"),
+        (
+            "[render]",
+            "[analysis]\nmargins = 1\n[render]",
+            r"analysis\.margins: unknown key, did you mean 'margin'",
+        ),
+        (
+            "[render]",
+            "[analysis]\nmargin = 0\n[render]",
+            r"analysis\.margin: got 0, expected a number from 0\.001 to 4",
+        ),
+        (
+            "[render]",
+            "[analysis]\nmargin = true\n[render]",
+            r"analysis\.margin: got True, expected a number",
+        ),
+        (
+            "[render]",
+            '[analysis]\ntest = "t"\n[render]',
+            r"analysis\.test: got 't', expected one of wilcoxon, sign",
+        ),
+        (
+            "[render]",
+            "[analysis.exclusions]\nzeta = 2\n[render]",
+            r"analysis\.exclusions\.zeta: got 2, expected a number from -1 to 1",
+        ),
+        (
+            "[render]",
+            "[analysis.exclusions]\nspeed = 2\n[render]",
+            r"analysis\.exclusions\.speed: unknown key",
+        ),
     ],
 )
 def test_faults_are_named(write_toml, old, new, message):
@@ -107,7 +186,9 @@ def test_faults_are_named(write_toml, old, new, message):
 
 def test_one_technique_is_no_comparison(write_toml):
     text = write_toml().read_text()
-    with pytest.raises(InputError, match=r"techniques: got .*, expected a list of at least 2 tables"):
+    with pytest.raises(
+        InputError, match=r"techniques: got .*, expected a list of at least 2 tables"
+    ):
         load_study(write_toml(text[: text.rindex("[[techniques]]")]))
 
 

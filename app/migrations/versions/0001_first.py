@@ -50,7 +50,9 @@ def upgrade() -> None:
         sa.Column("right", sa.String(100), nullable=False),
         sa.Column("seed", sa.String(50), nullable=False),
         sa.PrimaryKeyConstraint("id", name="pk_trials"),
-        sa.ForeignKeyConstraint(["participant_id"], ["participants.id"], name="fk_trials_participant_id"),
+        sa.ForeignKeyConstraint(
+            ["participant_id"], ["participants.id"], name="fk_trials_participant_id"
+        ),
         sa.UniqueConstraint("participant_id", "order", name="uq_trials_participant_id_order"),
     )
     op.create_index("ix_trials_participant_id", "trials", ["participant_id"])
@@ -73,9 +75,13 @@ def upgrade() -> None:
         sa.Column("shown_width", sa.Double),
         sa.Column("shown_height", sa.Double),
         sa.PrimaryKeyConstraint("id", name="pk_responses"),
-        sa.ForeignKeyConstraint(["participant_id"], ["participants.id"], name="fk_responses_participant_id"),
+        sa.ForeignKeyConstraint(
+            ["participant_id"], ["participants.id"], name="fk_responses_participant_id"
+        ),
         sa.ForeignKeyConstraint(["trial_id"], ["trials.id"], name="fk_responses_trial_id"),
-        sa.UniqueConstraint("participant_id", "trial_id", name="uq_responses_participant_id_trial_id"),
+        sa.UniqueConstraint(
+            "participant_id", "trial_id", name="uq_responses_participant_id_trial_id"
+        ),
         sa.UniqueConstraint("trial_id", name="uq_responses_trial_id"),
         sa.CheckConstraint("answer BETWEEN -2 AND 2", name=op.f("ck_responses_answer")),
         sa.CheckConstraint("rt_ms >= 0", name=op.f("ck_responses_rt_ms")),
@@ -89,7 +95,11 @@ def upgrade() -> None:
         sa.Column("detail", sa.String(200)),
         sa.Column("at", TIME, nullable=False),
         sa.PrimaryKeyConstraint("id", name="pk_events"),
-        sa.ForeignKeyConstraint(["participant_id"], ["participants.id"], name="fk_events_participant_id"),
+        sa.ForeignKeyConstraint(
+            ["participant_id"], ["participants.id"], name="fk_events_participant_id"
+        ),
         sa.ForeignKeyConstraint(["trial_id"], ["trials.id"], name="fk_events_trial_id"),
     )
-    op.create_index("ix_events_participant_id_trial_id_kind", "events", ["participant_id", "trial_id", "kind"])
+    op.create_index(
+        "ix_events_participant_id_trial_id_kind", "events", ["participant_id", "trial_id", "kind"]
+    )

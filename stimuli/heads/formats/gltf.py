@@ -1,7 +1,9 @@
-"""glTF 2.0, as .glb or as .gltf with its files (The Khronos Group, "glTF 2.0 Specification", 2021; section numbers below are its).
+"""glTF 2.0, as .glb or as .gltf with its files (The Khronos Group, "glTF 2.0 Specification", 2021;
+section numbers below are its).
 
-Read are the triangles of the scene with its transforms, and of each material the base colour, normal and roughness. Skins, morph
-targets and animation are left at rest, vertex colours are left out; both are said.
+Read are the triangles of the scene with its transforms, and of each material the base colour,
+normal and roughness. Skins, morph targets and animation are left at rest, vertex colours are left
+out; both are said.
 """
 
 import base64
@@ -14,42 +16,75 @@ import numpy as np
 from stimuli.errors import InputError
 from stimuli.heads.formats import UNNAMED, Material, Part, Source, decode_srgb, encode_srgb
 
-COMPONENT = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}  # 3.6.2.2
+COMPONENT = {
+    5120: np.int8,
+    5121: np.uint8,
+    5122: np.int16,
+    5123: np.uint16,
+    5125: np.uint32,
+    5126: np.float32,
+}  # 3.6.2.2
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 TRIANGLES, STRIP, FAN = 4, 5, 6  # 3.7.2.1
 GLB_MAGIC, GLB_JSON, GLB_BIN = b"glTF", 0x4E4F534A, 0x004E4942  # 4.4
-READ_EXTENSIONS = ("KHR_materials_", "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual")
-"""The beginnings of the names of extensions that a file may require: these are read, or change nothing that is read."""
+READ_EXTENSIONS = (
+    "KHR_materials_",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+)
+"""The beginnings of the names of extensions that a file may require: these are read, or change
+nothing that is read.
+"""
 
 
 def read(source: Source) -> list[Part]:
-    """Read the parts of a glTF file: one for each primitive of each mesh, wherever the scene places it."""
+    """Read the parts of a glTF file: one for each primitive of each mesh, wherever the scene places
+    it.
+    """
     data = source.content()
     try:
-        document, binary = _glb(source, data) if source.path.suffix.lower() == ".glb" else (json.loads(data), b"")
+        document, binary = (
+            _glb(source, data) if source.path.suffix.lower() == ".glb" else (json.loads(data), b"")
+        )
         return _Document(source, document, binary).parts()
     except InputError:
         raise
     except json.JSONDecodeError as error:
-        raise source.error(f"is not valid glTF: its JSON ends or breaks at character {error.pos} of {len(error.doc)}") from None
+        raise source.error(
+            f"is not valid glTF: its JSON ends or breaks at character {error.pos} of "
+            f"{len(error.doc)}"
+        ) from None
     except RecursionError:
-        raise source.error("is not valid glTF: its nodes contain themselves or are nested too deeply") from None
+        raise source.error(
+            "is not valid glTF: its nodes contain themselves or are nested too deeply"
+        ) from None
     except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError) as error:
         reason = f"{type(error).__name__}: {error}".replace("\n", " ")
-        raise source.error(f"is not valid glTF ({reason}); expected a file that a glTF validator accepts") from None
+        raise source.error(
+            f"is not valid glTF ({reason}); expected a file that a glTF validator accepts"
+        ) from None
 
 
 def _glb(source: Source, data: bytes) -> tuple[dict, bytes]:
     """Take the two chunks out of a binary file (4.4)."""
     if data[:4] != GLB_MAGIC:
-        raise source.error(f"is not a GLB file: it begins with {data[:4]!r}, expected {GLB_MAGIC!r}")
+        raise source.error(
+            f"is not a GLB file: it begins with {data[:4]!r}, expected {GLB_MAGIC!r}"
+        )
     if len(data) < 20:
         raise source.error(f"is cut short: it has {len(data)} bytes, expected 20 or more")
     version, length, json_length, json_type = struct.unpack_from("<4I", data, 4)
     if version != 2 or json_type != GLB_JSON:
-        raise source.error(f"is a GLB file of version {version}; expected version 2, beginning with its JSON")
+        raise source.error(
+            f"is a GLB file of version {version}; expected version 2, beginning with its JSON"
+        )
     if len(data) < length or length < 20 + json_length:
-        raise source.error(f"is cut short: it has {len(data)} bytes, its header promises {max(length, 20 + json_length)}")
+        raise source.error(
+            f"is cut short: it has {len(data)} bytes, its header promises "
+            f"{max(length, 20 + json_length)}"
+        )
     document, binary, at = json.loads(data[20 : 20 + json_length]), b"", 20 + json_length
     if at + 8 <= length:
         size, kind = struct.unpack_from("<2I", data, at)
@@ -66,17 +101,29 @@ class _Document:
         version = str(document["asset"]["version"])
         if version.partition(".")[0] != "2":
             raise source.error(f"is glTF of version {version}; expected 2.0")
-        unread = [name for name in document.get("extensionsRequired", []) if not name.startswith(READ_EXTENSIONS)]
+        unread = [
+            name
+            for name in document.get("extensionsRequired", [])
+            if not name.startswith(READ_EXTENSIONS)
+        ]
         if unread:
-            raise source.error(f"requires the glTF extension {', '.join(unread)}, which is not read; export it without compression")
-        self.buffers = [self._buffer(i, buffer, binary) for i, buffer in enumerate(document.get("buffers", []))]
+            raise source.error(
+                f"requires the glTF extension {', '.join(unread)}, which is not read; export "
+                "it without compression"
+            )
+        self.buffers = [
+            self._buffer(i, buffer, binary) for i, buffer in enumerate(document.get("buffers", []))
+        ]
         self.images: dict[int, np.ndarray] = {}
         self.materials: dict[int, Material] = {}
 
     def _buffer(self, index: int, buffer: dict, binary: bytes) -> bytes:
         data = self._uri(buffer["uri"], "buffer") if "uri" in buffer else binary
         if len(data) < buffer["byteLength"]:
-            raise self.source.error(f"is cut short: buffer {index} has {len(data)} bytes, expected {buffer['byteLength']}")
+            raise self.source.error(
+                f"is cut short: buffer {index} has {len(data)} bytes, expected "
+                f"{buffer['byteLength']}"
+            )
         return data
 
     def _uri(self, uri: str, what: str) -> bytes:
@@ -94,27 +141,50 @@ class _Document:
         start = view.get("byteOffset", 0)
         buffer = self.buffers[view["buffer"]]
         if not 0 <= start <= start + view["byteLength"] <= len(buffer):
-            raise self.source.error(f"is not valid glTF: bufferView {index} reaches outside its buffer of {len(buffer)} bytes")
+            raise self.source.error(
+                f"is not valid glTF: bufferView {index} reaches outside its buffer of "
+                f"{len(buffer)} bytes"
+            )
         return buffer[start : start + view["byteLength"]], view.get("byteStride", 0)
 
     def _item(self, kind: str, index: int) -> dict:
         items = self.document.get(kind, [])
         if not isinstance(index, int) or not 0 <= index < len(items):
-            raise self.source.error(f"is not valid glTF: it refers to {kind}[{index}] of {len(items)}")
+            raise self.source.error(
+                f"is not valid glTF: it refers to {kind}[{index}] of {len(items)}"
+            )
         return items[index]
 
     def accessor(self, index: int) -> np.ndarray:
-        """An accessor's values (count, columns): float64, normalised ones mapped to [0, 1] or [-1, 1] (3.6.2)."""
+        """An accessor's values (count, columns): float64, normalised ones mapped to [0, 1] or [-1,
+        1] (3.6.2).
+        """
         accessor = self._item("accessors", index)
         if "sparse" in accessor or "bufferView" not in accessor:
-            raise self.source.error(f"stores accessor {index} in sparse or compressed form, which is not read; export it plainly")
-        dtype, columns, count = np.dtype(COMPONENT[accessor["componentType"]]), COLUMNS[accessor["type"]], accessor["count"]
+            raise self.source.error(
+                f"stores accessor {index} in sparse or compressed form, which is not read; "
+                "export it plainly"
+            )
+        dtype, columns, count = (
+            np.dtype(COMPONENT[accessor["componentType"]]),
+            COLUMNS[accessor["type"]],
+            accessor["count"],
+        )
         data, stride = self._view(accessor["bufferView"])
         start, stride = accessor.get("byteOffset", 0), stride or dtype.itemsize * columns
-        if count < 1 or start < 0 or start + (count - 1) * stride + dtype.itemsize * columns > len(data):
-            raise self.source.error(f"is not valid glTF: accessor {index} asks for {count} items, more than its bufferView has")
+        if (
+            count < 1
+            or start < 0
+            or start + (count - 1) * stride + dtype.itemsize * columns > len(data)
+        ):
+            raise self.source.error(
+                f"is not valid glTF: accessor {index} asks for {count} items, more than its "
+                "bufferView has"
+            )
         strides = (stride, dtype.itemsize)
-        values = np.ndarray((count, columns), dtype.newbyteorder("<"), data, start, strides).astype(np.float64)
+        values = np.ndarray((count, columns), dtype.newbyteorder("<"), data, start, strides).astype(
+            np.float64
+        )
         if accessor.get("normalized"):
             values = np.maximum(values / np.iinfo(dtype).max, -1.0)
         return values
@@ -125,7 +195,9 @@ class _Document:
         if self.document.get("scenes"):
             roots = self._item("scenes", self.document.get("scene", 0)).get("nodes", [])
         else:
-            roots = sorted(set(range(len(nodes))).difference(*(node.get("children", []) for node in nodes)))
+            roots = sorted(
+                set(range(len(nodes))).difference(*(node.get("children", []) for node in nodes))
+            )
         return [part for root in roots for part in self._placed(root, np.eye(4))]
 
     def _placed(self, index: int, outer: np.ndarray) -> list[Part]:
@@ -136,12 +208,20 @@ class _Document:
         if "mesh" in node:
             mesh = self._item("meshes", node["mesh"])
             if any(node.get("weights", mesh.get("weights", []))):
-                self.source.note("its morph targets are not applied: the head is read in its base shape")
+                self.source.note(
+                    "its morph targets are not applied: the head is read in its base shape"
+                )
             if "skin" in node:
                 self.source.note("its skeleton is not applied: the head is read as it was modelled")
             name = mesh.get("name") or node.get("name") or UNNAMED
-            parts = [part for primitive in mesh["primitives"] if (part := self._part(name, primitive, matrix))]
-        return parts + [part for child in node.get("children", []) for part in self._placed(child, matrix)]
+            parts = [
+                part
+                for primitive in mesh["primitives"]
+                if (part := self._part(name, primitive, matrix))
+            ]
+        return parts + [
+            part for child in node.get("children", []) for part in self._placed(child, matrix)
+        ]
 
     def _part(self, mesh_name: str, primitive: dict, matrix: np.ndarray) -> Part | None:
         attributes, mode = primitive["attributes"], primitive.get("mode", TRIANGLES)
@@ -149,16 +229,24 @@ class _Document:
             self.source.note("its points and lines are not used")
             return None
         if "COLOR_0" in attributes:
-            self.source.note("its colours per vertex are not used; skin colour comes from a texture or a material")
+            self.source.note(
+                "its colours per vertex are not used; skin colour comes from a texture or a "
+                "material"
+            )
         positions = self.accessor(attributes["POSITION"])
         order = np.arange(len(positions))
         if "indices" in primitive:
             order = self.accessor(primitive["indices"])[:, 0].astype(np.int64)
             if order.max() >= len(positions):
-                raise self.source.error(f"the mesh {mesh_name!r} has vertex index {order.max()}, expected 0 to {len(positions) - 1}")
+                raise self.source.error(
+                    f"the mesh {mesh_name!r} has vertex index {order.max()}, expected 0 to "
+                    f"{len(positions) - 1}"
+                )
         if mode == TRIANGLES:
             if len(order) % 3:
-                raise self.source.error(f"the mesh {mesh_name!r} has {len(order)} corners, expected a multiple of 3")
+                raise self.source.error(
+                    f"the mesh {mesh_name!r} has {len(order)} corners, expected a multiple of 3"
+                )
             faces = order.reshape(-1, 3)
         elif mode == STRIP:
             faces = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
@@ -180,11 +268,23 @@ class _Document:
             uvs = self._uvs(attributes, {})
         lengths = {len(values) for values in (positions, normals, uvs) if values is not None}
         if len(lengths) > 1:
-            raise self.source.error(f"is not valid glTF: the attributes of the mesh {mesh_name!r} have different lengths {sorted(lengths)}")
-        return Part(material.name or mesh_name, positions @ linear.T + matrix[:3, 3], faces, normals, uvs, material)
+            raise self.source.error(
+                f"is not valid glTF: the attributes of the mesh {mesh_name!r} have different "
+                f"lengths {sorted(lengths)}"
+            )
+        return Part(
+            material.name or mesh_name,
+            positions @ linear.T + matrix[:3, 3],
+            faces,
+            normals,
+            uvs,
+            material,
+        )
 
     def _uvs(self, attributes: dict, texture: dict) -> np.ndarray | None:
-        """Texture coordinates, moved as KHR_texture_transform says, v turned up (glTF's points down)."""
+        """Texture coordinates, moved as KHR_texture_transform says, v turned up (glTF's points
+        down).
+        """
         transform = texture.get("extensions", {}).get("KHR_texture_transform", {})
         name = f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}"
         if name not in attributes:
@@ -203,9 +303,15 @@ class _Document:
             colour, factor = specular.get("diffuseTexture"), specular.get("diffuseFactor")
         rough, normal = pbr.get("metallicRoughnessTexture"), stored.get("normalTexture")
         references = [reference for reference in (colour, rough, normal) if reference]
-        places = [(r.get("texCoord", 0), r.get("extensions", {}).get("KHR_texture_transform", {})) for r in references]
+        places = [
+            (r.get("texCoord", 0), r.get("extensions", {}).get("KHR_texture_transform", {}))
+            for r in references
+        ]
         if any(place != places[0] for place in places):
-            raise self.source.error(f"the material {stored.get('name', index)!r} lays its textures out differently; expected one layout")
+            raise self.source.error(
+                f"the material {stored.get('name', index)!r} lays its textures out "
+                "differently; expected one layout"
+            )
         texture = references[0] if references else {}
         if index not in self.materials:
             tint = tuple(float(value) for value in factor[:3]) if factor else None
@@ -213,20 +319,29 @@ class _Document:
                 name=stored.get("name"),
                 albedo=_tinted(self._image(colour), tint or (1.0, 1.0, 1.0)) if colour else None,
                 base_colour=tint,
-                normal_map=_scaled_normals(self._image(normal), normal.get("scale", 1.0)) if normal else None,
-                roughness=self._roughness(rough, pbr.get("roughnessFactor", 1.0)) if rough else None,
+                normal_map=_scaled_normals(self._image(normal), normal.get("scale", 1.0))
+                if normal
+                else None,
+                roughness=self._roughness(rough, pbr.get("roughnessFactor", 1.0))
+                if rough
+                else None,
                 roughness_factor=pbr.get("roughnessFactor"),
             )
         return self.materials[index], texture
 
     def _roughness(self, reference: dict, factor: float) -> np.ndarray:
-        return np.rint(self._image(reference)[..., 1] * factor).astype(np.uint8)  # 3.9.2: roughness is in green
+        return np.rint(self._image(reference)[..., 1] * factor).astype(
+            np.uint8
+        )  # 3.9.2: roughness is in green
 
     def _image(self, reference: dict) -> np.ndarray:
         texture = self._item("textures", reference["index"])
         index = texture.get("extensions", {}).get("EXT_texture_webp", texture).get("source")
         if index is None:
-            raise self.source.error(f"has texture {reference['index']} in a form that is not read; export it as PNG or JPEG")
+            raise self.source.error(
+                f"has texture {reference['index']} in a form that is not read; export it as "
+                "PNG or JPEG"
+            )
         if index not in self.images:
             image = self._item("images", index)
             name = image.get("name") or f"image {index}"
@@ -259,8 +374,12 @@ def _tinted(image: np.ndarray, factor: tuple[float, ...]) -> np.ndarray:
     """An sRGB image times a linear factor (3.9.2), in sRGB."""
     if all(value == 1 for value in factor):
         return image
-    table = np.stack([encode_srgb(decode_srgb(np.arange(256) / 255) * value) for value in factor], axis=1)
-    return np.rint(np.stack([table[image[..., i], i] for i in range(3)], axis=-1) * 255).astype(np.uint8)
+    table = np.stack(
+        [encode_srgb(decode_srgb(np.arange(256) / 255) * value) for value in factor], axis=1
+    )
+    return np.rint(np.stack([table[image[..., i], i] for i in range(3)], axis=-1) * 255).astype(
+        np.uint8
+    )
 
 
 def _scaled_normals(image: np.ndarray, scale: float) -> np.ndarray:
