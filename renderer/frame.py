@@ -314,7 +314,7 @@ class Frame:
     def _draw_hair(self) -> None:
         r, strands = self.renderer, self.renderer.model.strands
         self.hair = gl.Target(self.width, self.height, [GL.GL_RGBA16F], depth=self.surface)
-        self.hair.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True, blend=True)
+        self.hair.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True, blend="over")
         if strands is None:
             return
         distance = np.linalg.norm(strands.points.mean(axis=1) - self.view.eye, axis=1)

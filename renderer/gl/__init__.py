@@ -1,0 +1,21 @@
+"""OpenGL by name: context, program, texture, target, mesh. Everything raises."""
+
+from renderer.gl.context import GL, PLATFORMS, Context
+from renderer.gl.mesh import Mesh, draw_fullscreen, finish
+from renderer.gl.program import Program, source
+from renderer.gl.texture import DepthArray, Target, Texture, TextureArray
+
+__all__ = [
+    "GL",
+    "PLATFORMS",
+    "Context",
+    "DepthArray",
+    "Mesh",
+    "Program",
+    "Target",
+    "Texture",
+    "TextureArray",
+    "draw_fullscreen",
+    "finish",
+    "source",
+]

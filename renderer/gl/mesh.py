@@ -1,0 +1,66 @@
+"""Vertex attributes with triangles or points, and what draws without any."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from renderer.gl.context import GL, Context, free, owned
+
+
+def _delete_vertex_array(name: int) -> None:
+    GL.glDeleteVertexArrays(1, [name])
+
+
+def _delete_buffer(name: int) -> None:
+    GL.glDeleteBuffers(1, [name])
+
+
+class Mesh:
+    """Vertex attributes (location -> (N, k) array) and triangles (M, 3); without these, points."""
+
+    def __init__(self, attributes: dict[int, np.ndarray], faces: np.ndarray | None = None):
+        self.vertices = len(next(iter(attributes.values())))
+        self.vertex_array = GL.glGenVertexArrays(1)
+        self._handles = [owned(self, self.vertex_array, _delete_vertex_array)]
+        GL.glBindVertexArray(self.vertex_array)
+        for where, array in attributes.items():
+            array = np.ascontiguousarray(array, dtype=np.float32)
+            self._buffer(GL.GL_ARRAY_BUFFER, array)
+            GL.glEnableVertexAttribArray(where)
+            GL.glVertexAttribPointer(where, array.shape[1], GL.GL_FLOAT, False, 0, None)
+        self.indices = 0
+        if faces is not None:
+            faces = np.ascontiguousarray(faces, dtype=np.uint32)
+            self.indices = faces.size
+            self._buffer(GL.GL_ELEMENT_ARRAY_BUFFER, faces)
+        GL.glBindVertexArray(0)
+
+    def _buffer(self, kind: int, array: np.ndarray) -> None:
+        name = GL.glGenBuffers(1)
+        self._handles.append(owned(self, name, _delete_buffer))
+        GL.glBindBuffer(kind, name)
+        GL.glBufferData(kind, array.nbytes, array, GL.GL_STATIC_DRAW)
+
+    def draw(self) -> None:
+        GL.glBindVertexArray(self.vertex_array)
+        if self.indices:
+            GL.glDrawElements(GL.GL_TRIANGLES, self.indices, GL.GL_UNSIGNED_INT, None)
+        else:
+            GL.glDrawArrays(GL.GL_POINTS, 0, self.vertices)
+        GL.glBindVertexArray(0)
+
+    def delete(self) -> None:
+        for handle in self._handles:
+            free(handle)
+
+
+def draw_fullscreen(context: Context) -> None:
+    """One triangle over the bound target."""
+    GL.glBindVertexArray(context.vertex_array)
+    GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+    GL.glBindVertexArray(0)
+
+
+def finish() -> None:
+    """Wait until everything drawn so far is done."""
+    GL.glFinish()

@@ -1,0 +1,238 @@
+"""Textures, and targets to draw into."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+
+from renderer.errors import InputError
+from renderer.gl.context import GL, free, owned
+
+_FORMATS = {  # internal format -> (format, channels)
+    GL.GL_RGBA32F: (GL.GL_RGBA, 4),
+    GL.GL_RGBA16F: (GL.GL_RGBA, 4),
+    GL.GL_RG16F: (GL.GL_RG, 2),
+    GL.GL_R32F: (GL.GL_RED, 1),
+    GL.GL_RGBA8: (GL.GL_RGBA, 4),
+    GL.GL_DEPTH_COMPONENT32F: (GL.GL_DEPTH_COMPONENT, 1),
+}
+BLENDS = ("over", "add")
+
+
+def _delete_texture(name: int) -> None:
+    GL.glDeleteTextures(1, [name])
+
+
+def _delete_framebuffer(name: int) -> None:
+    GL.glDeleteFramebuffers(1, [name])
+
+
+def _delete_renderbuffer(name: int) -> None:
+    GL.glDeleteRenderbuffers(1, [name])
+
+
+class Texture:
+    """A 2-D texture. Linear or nearest filter, clamped at the edges unless it repeats."""
+
+    kind = GL.GL_TEXTURE_2D
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        internal: int = GL.GL_RGBA16F,
+        linear: bool = False,
+        data: np.ndarray | None = None,
+        mipmap: bool = False,
+        repeat: bool = False,
+    ):
+        self.width, self.height, self.internal = width, height, internal
+        self.id = GL.glGenTextures(1)
+        self._handle = owned(self, self.id, _delete_texture)
+        GL.glBindTexture(self.kind, self.id)
+        self._fill(data)
+        smooth = GL.GL_LINEAR if linear else GL.GL_NEAREST
+        small = GL.GL_LINEAR_MIPMAP_LINEAR if mipmap else smooth
+        wrap = GL.GL_REPEAT if repeat else GL.GL_CLAMP_TO_EDGE
+        GL.glTexParameteri(self.kind, GL.GL_TEXTURE_MIN_FILTER, small)
+        GL.glTexParameteri(self.kind, GL.GL_TEXTURE_MAG_FILTER, smooth)
+        GL.glTexParameteri(self.kind, GL.GL_TEXTURE_WRAP_S, wrap)
+        GL.glTexParameteri(self.kind, GL.GL_TEXTURE_WRAP_T, wrap)
+        if mipmap:
+            GL.glGenerateMipmap(self.kind)
+
+    def _fill(self, data: np.ndarray | None) -> None:
+        form, _ = _FORMATS[self.internal]
+        number, data = _upload(data)
+        size = (self.width, self.height)
+        GL.glTexImage2D(self.kind, 0, self.internal, *size, 0, form, number, data)
+
+    def read(self) -> np.ndarray:
+        """The texels: (height, width, channels) float32, row 0 at the top."""
+        form, channels = _FORMATS[self.internal]
+        GL.glBindTexture(self.kind, self.id)
+        out = np.empty((self.height, self.width, channels), dtype=np.float32)
+        GL.glGetTexImage(self.kind, 0, form, GL.GL_FLOAT, out)
+        return out[::-1]
+
+    def delete(self) -> None:
+        free(self._handle)
+
+
+class TextureArray(Texture):
+    """Layers of 2-D textures of one size; data: (layers, height, width, channels), row 0 below."""
+
+    kind = GL.GL_TEXTURE_2D_ARRAY
+
+    def __init__(self, width: int, height: int, layers: int, internal: int, **options):
+        self.layers = layers
+        super().__init__(width, height, internal, **options)
+
+    def _fill(self, data: np.ndarray | None) -> None:
+        form, _ = _FORMATS[self.internal]
+        number, data = _upload(data)
+        size = (self.width, self.height, self.layers)
+        GL.glTexImage3D(self.kind, 0, self.internal, *size, 0, form, number, data)
+
+    def read(self) -> np.ndarray:
+        """The texels: (layers, height, width, channels) float32, row 0 at the top."""
+        form, channels = _FORMATS[self.internal]
+        GL.glBindTexture(self.kind, self.id)
+        out = np.empty((self.layers, self.height, self.width, channels), dtype=np.float32)
+        GL.glGetTexImage(self.kind, 0, form, GL.GL_FLOAT, out)
+        return out[:, ::-1]
+
+
+def _upload(data: np.ndarray | None) -> tuple[int, np.ndarray | None]:
+    """The type that OpenGL is told, and the data as it reads them."""
+    GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+    if data is None:
+        return GL.GL_FLOAT, None
+    number = GL.GL_UNSIGNED_BYTE if data.dtype == np.uint8 else GL.GL_FLOAT
+    if number == GL.GL_FLOAT:
+        data = data.astype(np.float32, copy=False)
+    return number, np.ascontiguousarray(data)
+
+
+class Target:
+    """A framebuffer: one texture per internal format, and a depth buffer of its own or another's.
+
+    depth: True for a buffer of its own, another Target to share that one's, False for none.
+    """
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        formats: list[int],
+        depth: bool | Target = False,
+        linear: bool = False,
+    ):
+        self.width, self.height = width, height
+        self.textures = [Texture(width, height, internal, linear) for internal in formats]
+        self._framebuffer()
+        self._depth, self._depth_handle = None, None
+        for k, texture in enumerate(self.textures):
+            where = GL.GL_COLOR_ATTACHMENT0 + k
+            GL.glFramebufferTexture2D(GL.GL_FRAMEBUFFER, where, GL.GL_TEXTURE_2D, texture.id, 0)
+        if depth:
+            if isinstance(depth, Target):
+                self._depth = depth._depth
+            else:
+                self._depth = GL.glGenRenderbuffers(1)
+                self._depth_handle = owned(self, self._depth, _delete_renderbuffer)
+                GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, self._depth)
+                kind = GL.GL_DEPTH_COMPONENT32F
+                GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, kind, width, height)
+            GL.glFramebufferRenderbuffer(
+                GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, GL.GL_RENDERBUFFER, self._depth
+            )
+        GL.glDrawBuffers(len(formats), [GL.GL_COLOR_ATTACHMENT0 + k for k in range(len(formats))])
+        self._complete()
+
+    def _framebuffer(self) -> None:
+        self.id = GL.glGenFramebuffers(1)
+        self._handle = owned(self, self.id, _delete_framebuffer)
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.id)
+
+    def _complete(self) -> None:
+        state = GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER)
+        if state != GL.GL_FRAMEBUFFER_COMPLETE:
+            raise InputError(
+                f"a {self.width}x{self.height} render target is not possible on this driver "
+                f"(status {int(state):#x}); expected a smaller size"
+            )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.delete()
+
+    def bind(
+        self,
+        clear: tuple[float, ...] | None = None,
+        depth_test: bool = False,
+        blend: str | None = None,
+    ) -> None:
+        """Draw here from now on, with all state that matters set afresh.
+
+        blend "over": premultiplied colour over what is there; "add": sums (all channels).
+        """
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.id)
+        GL.glViewport(0, 0, self.width, self.height)
+        GL.glDisable(GL.GL_CULL_FACE)
+        GL.glDisable(GL.GL_SCISSOR_TEST)
+        GL.glColorMask(True, True, True, True)
+        GL.glDepthMask(blend is None)
+        (GL.glEnable if depth_test else GL.glDisable)(GL.GL_DEPTH_TEST)
+        GL.glDepthFunc(GL.GL_LEQUAL)
+        (GL.glEnable if blend else GL.glDisable)(GL.GL_BLEND)
+        over = GL.GL_ONE_MINUS_SRC_ALPHA if blend != "add" else GL.GL_ONE
+        GL.glBlendFunc(GL.GL_ONE, over)
+        if clear is not None:
+            GL.glClearColor(*clear)
+            GL.glClearDepth(1.0)
+            depth = GL.GL_DEPTH_BUFFER_BIT if depth_test and blend is None else 0
+            GL.glClear(GL.GL_COLOR_BUFFER_BIT | depth)
+
+    def delete(self) -> None:
+        for texture in self.textures:
+            texture.delete()
+        if self._depth_handle is not None:
+            free(self._depth_handle)
+        free(self._handle)
+
+
+class DepthArray(Target):
+    """Layers of depth alone, to be drawn one by one and read as a texture array.
+
+    Depth is what a fragment shader writes, or the clip space's own z; 1 where nothing is.
+    """
+
+    def __init__(self, size: int, layers: int):
+        self.width = self.height = size
+        self.textures = []
+        self._depth_handle = None
+        self.array = TextureArray(size, size, layers, GL.GL_DEPTH_COMPONENT32F)
+        self._framebuffer()
+        self._attach(0)
+        GL.glDrawBuffer(GL.GL_NONE)
+        GL.glReadBuffer(GL.GL_NONE)
+        self._complete()
+
+    def _attach(self, layer: int) -> None:
+        GL.glFramebufferTextureLayer(
+            GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, self.array.id, 0, layer
+        )
+
+    def bind_layer(self, layer: int) -> None:
+        """Clear a layer and draw into it from now on."""
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.id)
+        self._attach(layer)
+        self.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True)
+
+    def delete(self) -> None:
+        self.array.delete()
+        super().delete()
