@@ -1,0 +1,94 @@
+"""What stands before the camera, as arrays: skin, eyes, hair.
+
+Lengths are millimetres, y is up, the head looks along +z, the crown is at y = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Skin:
+    """The scattering surface.
+
+    positions, normals (N, 3) float32; uvs (N, 2); faces (M, 3). masks: (N, 8) in [0, 1], columns
+    MASKS. proxy: what rays are traced against. maps: albedo (H, W, 3) uint8 sRGB, normal (H, W, 3)
+    uint8 tangent space, roughness (H, W) uint8; None: procedural.
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    uvs: np.ndarray
+    faces: np.ndarray
+    masks: np.ndarray
+    proxy: Proxy
+    albedo_map: np.ndarray | None = None
+    normal_map: np.ndarray | None = None
+    roughness_map: np.ndarray | None = None
+    base_colour: tuple[float, float, float] | None = None  # linear albedo where there is no map
+    scatters: np.ndarray | None = (
+        None  # (N,) 1 where the material scatters, 0 for eyes and teeth of a scan; None: all of it
+    )
+
+
+@dataclass(frozen=True)
+class Proxy:
+    """A mesh of the skin's shape, coarser or the same, on which light is baked.
+
+    positions, normals (P, 3); faces (Q, 3); albedo (P, 3) linear; to_full: sparse (N, P), carries
+    values to the skin.
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    albedo: np.ndarray
+    to_full: object
+
+
+MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
+
+
+@dataclass(frozen=True)
+class Eye:
+    """An eyeball with its cornea: positions, normals (N, 3), faces (M, 3); centre, gaze (3,),
+    radius, iris_radius mm.
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    centre: np.ndarray
+    gaze: np.ndarray
+    radius: float
+    iris_radius: float
+
+
+@dataclass(frozen=True)
+class Strands:
+    """Hair as polylines: points (S, P, 3) mm; width_mm (S,); colour (S, 3) linear albedo; cover (S,
+    P) in [0, 1], the share of the hair layer above each point; root_vertex (S,) index into Skin.
+    """
+
+    points: np.ndarray
+    width_mm: np.ndarray
+    colour: np.ndarray
+    cover: np.ndarray
+    root_vertex: np.ndarray
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything that stands before the camera.
+
+    landmarks: name -> (3,) mm, at least eyes, eye_l, eye_r, mouth, nose.
+    """
+
+    skin: Skin
+    eyes: tuple[Eye, ...]
+    strands: Strands | None
+    landmarks: dict[str, np.ndarray]
+    procedural: bool = True  # skin colour and relief come from the shader, not from maps

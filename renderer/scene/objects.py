@@ -1,0 +1,148 @@
+"""Objects: a shape, a material and a place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from renderer.errors import InputError
+from renderer.parameters import Parameters, parameter
+
+UNITS = ("mm", "cm", "m", "in")
+UP_AXES = ("y", "z")
+
+
+@dataclass(frozen=True)
+class Object(Parameters):
+    """What every object has: the name of its material, and its place.
+
+    The shape's own coordinates are scaled, then turned about x, y and z (in that order), then
+    moved. Persons keep their crown at y = 0; generated shapes are centred on the origin.
+    """
+
+    shape: ClassVar[str]
+    called: ClassVar[str] = "object"
+
+    material: str = parameter("skin", source="a name in the scene's materials")
+    position_mm: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="mm", low=-1e5, high=1e5, source="the scene's"
+    )
+    rotation_deg: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="degrees", low=-360.0, high=360.0, source="the scene's"
+    )
+    scale: float = parameter(1.0, low=1e-3, high=1e3, source="the scene's")
+
+    def plain(self) -> dict[str, Any]:
+        return {"shape": self.shape, **super().plain()}
+
+    def pose(self) -> np.ndarray:
+        """Object to world (4, 4), mm."""
+        x, y, z = np.radians(self.rotation_deg)
+        turn = np.eye(3)
+        for angle, (i, j) in ((x, (1, 2)), (y, (2, 0)), (z, (0, 1))):
+            step = np.eye(3)
+            step[i, i] = step[j, j] = np.cos(angle)
+            step[j, i], step[i, j] = np.sin(angle), -np.sin(angle)
+            turn = step @ turn
+        pose = np.eye(4)
+        pose[:3, :3] = turn * self.scale
+        pose[:3, 3] = self.position_mm
+        return pose
+
+
+@dataclass(frozen=True)
+class Person(Object):
+    """A head to mid-chest, generated from a named set of parameters (stimuli/people)."""
+
+    shape: ClassVar[str] = "person"
+
+    person: str = parameter("man", source="stimuli/people")
+
+
+@dataclass(frozen=True)
+class Scan(Object):
+    """A user's head: .glb, .gltf or .obj; unit and upward axis are found out where not given."""
+
+    shape: ClassVar[str] = "scan"
+
+    file: str = parameter("scan.glb", source="the user's")
+    unit: str | None = parameter((None, "mm"), choices=(None, *UNITS), optional=True)
+    up: str | None = parameter((None, "y"), choices=(None, *UP_AXES), optional=True)
+
+
+@dataclass(frozen=True)
+class Mesh(Object):
+    """Any mesh that trimesh reads: .glb, .obj, .ply, .stl; it is centred on the origin."""
+
+    shape: ClassVar[str] = "mesh"
+
+    file: str = parameter("mesh.ply", source="the user's")
+    unit: str = parameter("mm", choices=UNITS, source="the user's")
+    up: str = parameter("y", choices=UP_AXES, source="the user's")
+
+
+@dataclass(frozen=True)
+class Sphere(Object):
+    """A sphere about the origin."""
+
+    shape: ClassVar[str] = "sphere"
+
+    radius_mm: float = parameter(50.0, unit="mm", low=0.01, high=1e4, source="the scene's")
+
+
+@dataclass(frozen=True)
+class Slab(Object):
+    """A box of the given width, height and depth; its front faces +z."""
+
+    shape: ClassVar[str] = "slab"
+
+    size_mm: tuple[float, float, float] = parameter(
+        (200.0, 200.0, 40.0), unit="mm", low=0.01, high=1e4, source="the scene's"
+    )
+
+
+@dataclass(frozen=True)
+class Sheet(Object):
+    """A thin sheet that faces +z: a slab whose thickness is its point."""
+
+    shape: ClassVar[str] = "sheet"
+
+    size_mm: tuple[float, float] = parameter(
+        (200.0, 200.0), unit="mm", low=0.01, high=1e4, source="the scene's"
+    )
+    thickness_mm: float = parameter(2.0, unit="mm", low=0.01, high=1e3, source="the scene's")
+
+
+@dataclass(frozen=True)
+class Box(Object):
+    """A room: the inner faces of a box, open towards +z; its left and right walls have colours."""
+
+    shape: ClassVar[str] = "box"
+
+    size_mm: tuple[float, float, float] = parameter(
+        (500.0, 500.0, 500.0), unit="mm", low=0.1, high=1e5, source="the Cornell box's proportions"
+    )
+    left_albedo: tuple[float, float, float] = parameter(
+        (0.63, 0.06, 0.05), low=0.0, high=1.0, source="red, as in Goral et al. 1984"
+    )
+    right_albedo: tuple[float, float, float] = parameter(
+        (0.05, 0.06, 0.63), low=0.0, high=1.0, source="blue, as in Goral et al. 1984"
+    )
+
+
+SHAPES: dict[str, type[Object]] = {
+    kind.shape: kind for kind in (Person, Scan, Mesh, Sphere, Slab, Sheet, Box)
+}
+
+
+def read_object(table: Mapping[str, Any], where: str) -> Object:
+    """An object from a table, by its `shape`."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} is {table!r:.60}; expected a table")
+    shape = table.get("shape")
+    if shape not in SHAPES:
+        raise InputError(f"{where}.shape is {shape!r:.60}; expected one of {', '.join(SHAPES)}")
+    return SHAPES[shape].read({k: v for k, v in table.items() if k != "shape"}, where)
