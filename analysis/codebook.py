@@ -13,7 +13,7 @@ from pathlib import Path
 
 from analysis.errors import InputError
 
-MANIFEST_FORMAT = "subdermal-manifest/1"
+MANIFEST_FORMATS = ("subdermal-manifest/1", "subdermal-manifest/2")
 #: The factor that answers are grouped by when none is chosen.
 FRAMING = "framing"
 #: From near to far. A randomised questionnaire shows them in any order, so that first appearance
@@ -70,10 +70,11 @@ class Codebook:
         """
         levels, spoken = tuple(levels), factor.replace("_", " ")
         labels = {key: label for key, label in self.labels.items() if key[0] != "framing"}
+        declared = {level: label for (key, level), label in self.labels.items() if key == factor}
         labels |= {
-            ("framing", level): f"{level} ({spoken})"
+            ("framing", level): declared.get(level, f"{level} ({spoken})")
             for level in levels
-            if not any(map(str.isalpha, level))
+            if level in declared or not any(map(str.isalpha, level))
         }
         return replace(self, framings=levels, framing_rule=rule, labels=labels, factor=factor)
 
@@ -149,9 +150,9 @@ def read_manifest(path: str | Path) -> Codebook:
         ) from None
     except ValueError as error:
         raise InputError(f"{path}: not JSON: {' '.join(str(error).split())}") from None
-    if not isinstance(manifest, dict) or manifest.get("format") != MANIFEST_FORMAT:
+    if not isinstance(manifest, dict) or manifest.get("format") not in MANIFEST_FORMATS:
         got = manifest.get("format") if isinstance(manifest, dict) else type(manifest).__name__
-        raise InputError(f"{path}: format is {got!r}, expected {MANIFEST_FORMAT!r}")
+        raise InputError(f"{path}: format is {got!r}, expected {MANIFEST_FORMATS[-1]!r}")
     study = manifest.get("study")
     if not isinstance(study, dict):
         raise InputError(
@@ -172,10 +173,20 @@ def read_manifest(path: str | Path) -> Codebook:
         order_rule=f"the study's ({path.name})",
         framing_rule=f"the study's ({path.name})",
         labels={("framing", name): label for name, label in framings.items()}
-        | {("technique", name): label for name, label in techniques.items()},
+        | {("technique", name): label for name, label in techniques.items()}
+        | _further(study),
         familiarity=FAMILIARITY if levels is None else tuple(levels),
         title=str(study.get("title") or study.get("name") or ""),
     )
+
+
+def _further(study: dict) -> dict[tuple[str, str], str]:
+    """(factor, level) -> label of the factors beside framing."""
+    found = {}
+    for factor in study.get("factors") or []:
+        for level in factor.get("levels", []):
+            found[factor["name"], level["name"]] = level.get("label", level["name"])
+    return found
 
 
 def _named(path: Path, study: dict, key: str) -> dict[str, str]:

@@ -22,10 +22,10 @@ def assign(study: Study, participant: Participant) -> list[Trial]:
         Trial(
             participant_id=participant.id,
             order=trial.order,
-            framing=trial.framing,
+            cell=trial.cell,
             left=trial.left,
             right=trial.right,
             seed=f"{study.seed}/{participant.id}",
         )
-        for trial in trials(study.framings, study.techniques, study.seed, participant.id)
+        for trial in trials(study.cells, study.techniques, study.seed, participant.id)
     ]

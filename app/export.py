@@ -19,6 +19,7 @@ from sqlalchemy.orm import Session
 
 from app.models import Participant, Response, Trial
 from app.study import Study
+from stimuli.study import FRAMING
 
 CHUNK_ROWS = 500
 
@@ -71,7 +72,7 @@ COLUMNS = (
         "text",
         "a framing of the study",
         "Distance at which both images of the question were taken",
-        lambda r: r.trial.framing,
+        lambda r: r.study.asked.cell(r.trial.cell).framing,
     ),
     Column(
         "left",
@@ -227,7 +228,22 @@ COLUMNS = (
         lambda r: r.response.shown_height,
     ),
 )
-NAMES = tuple(column.name for column in COLUMNS)
+
+
+def columns(study: Study) -> tuple[Column, ...]:
+    """The columns of a study's table: one for each factor beside framing, after framing's."""
+    place = 1 + next(i for i, column in enumerate(COLUMNS) if column.name == FRAMING)
+    further = [
+        Column(
+            factor.name,
+            "text",
+            "a level of the study",
+            f"{factor.label}: the level that both images of the question have",
+            lambda r, name=factor.name: r.study.asked.cell(r.trial.cell).levels[name],
+        )
+        for factor in study.asked.factors[1:]
+    ]
+    return (*COLUMNS[:place], *further, *COLUMNS[place:])
 
 
 def counted(*columns: Any) -> Select:
@@ -251,23 +267,25 @@ def count(session: Session) -> int:
 def records(session: Session, study: Study, *, simulated: bool) -> Iterator[dict[str, Any]]:
     """The rows of the table, by participant and order, as mappings."""
     query = counted(Participant, Trial, Response).order_by(Participant.id, Trial.order)
+    described = columns(study)
     for participant, trial, response in session.execute(
         query.execution_options(yield_per=CHUNK_ROWS)
     ):
         row = Row(study, simulated, participant, trial, response)
-        yield {column.name: column.value(row) for column in COLUMNS}
+        yield {column.name: column.value(row) for column in described}
 
 
 def responses_csv(session: Session, study: Study, *, simulated: bool) -> Iterator[str]:
     """responses.csv, a chunk at a time."""
-    return _csv(NAMES, (row.values() for row in records(session, study, simulated=simulated)))
+    names = [column.name for column in columns(study)]
+    return _csv(names, (row.values() for row in records(session, study, simulated=simulated)))
 
 
-def codebook_csv() -> Iterator[str]:
+def codebook_csv(study: Study) -> Iterator[str]:
     """codebook.csv: a row for each column of responses.csv."""
     return _csv(
         ("column", "type", "values", "description"),
-        ((c.name, c.type, c.values, c.description) for c in COLUMNS),
+        ((c.name, c.type, c.values, c.description) for c in columns(study)),
     )
 
 
@@ -286,12 +304,16 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
         "",
         "| column | type | values | description |",
         "|---|---|---|---|",
-        *(f"| `{c.name}` | {c.type} | {c.values} | {c.description} |" for c in COLUMNS),
+        *(f"| `{c.name}` | {c.type} | {c.values} | {c.description} |" for c in columns(study)),
         "",
         f"Question: {asked.question.text}",
         "",
         *(f"- answer {level.value}: {level.label}" for level in asked.scale),
-        *(f"- framing `{framing.name}`: {framing.label}" for framing in asked.framings),
+        *(
+            f"- {factor.name} `{level.name}`: {level.label}"
+            for factor in asked.factors
+            for level in factor.levels
+        ),
         *(f"- technique `{condition.name}`: {condition.label}" for condition in asked.techniques),
         "",
         f"Familiarity: {asked.familiarity.question}",
@@ -309,7 +331,7 @@ def write(directory: Path, session: Session, study: Study, *, simulated: bool) -
     answers.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    _replace(directory / "codebook.csv", codebook_csv())
+    _replace(directory / "codebook.csv", codebook_csv(study))
     _replace(directory / "codebook.md", [codebook_md(study, simulated=simulated)])
     _replace(directory / "responses.csv", responses_csv(session, study, simulated=simulated))
     return count(session)

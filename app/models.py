@@ -62,7 +62,7 @@ class StudyRecord(Base):
     name: Mapped[str] = mapped_column(String(200))
     version: Mapped[int]
     seed: Mapped[int] = mapped_column(BigInteger)
-    design: Mapped[str]  # JSON: the names of framings and techniques, in the order of the study
+    design: Mapped[str]  # JSON: the names of cells and techniques, in the order of the study
     secret_key: Mapped[str] = mapped_column(String(64))  # signs the cookies
     password_hash: Mapped[str | None] = mapped_column(
         String(255)
@@ -107,7 +107,7 @@ class Trial(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     participant_id: Mapped[int] = mapped_column(ForeignKey("participants.id"), index=True)
     order: Mapped[int]  # from 1
-    framing: Mapped[str] = mapped_column(String(100))
+    cell: Mapped[str] = mapped_column(String(100))  # names of its levels, joined by dots
     left: Mapped[str] = mapped_column(String(100))
     right: Mapped[str] = mapped_column(String(100))
     seed: Mapped[str] = mapped_column(

@@ -10,6 +10,14 @@ from pathlib import Path
 from stimuli.manifest import Image, Manifest, load_manifest
 from stimuli.study import Study as Definition
 
+#: What most people take for a question: the thesis's 30 took 10 to 15 minutes.
+SECONDS_A_QUESTION = (20, 30)
+#: What app.models stores of a person, in words; tests hold it to the tables.
+RECORDED = (
+    "your self-rating, your answers, the times at which you began, answered and ended, how often "
+    "a question was opened, the size of your window and of the images on it, and its scaling"
+)
+
 
 @dataclass(frozen=True)
 class Study:
@@ -45,7 +53,12 @@ class Study:
 
     @cached_property
     def framings(self) -> tuple[str, ...]:
-        return tuple(framing.name for framing in self.asked.framings)
+        return tuple(level.name for level in self.asked.framings)
+
+    @cached_property
+    def cells(self) -> tuple[str, ...]:
+        """The names of the cells: the framings' own where the study varies nothing else."""
+        return tuple(cell.name for cell in self.asked.cells)
 
     @cached_property
     def techniques(self) -> tuple[str, ...]:
@@ -56,14 +69,30 @@ class Study:
         """The names, in the order of the study: what must stay for answers to belong together
         (JSON).
         """
-        return json.dumps({"framings": self.framings, "techniques": self.techniques})
+        # the key is that of the first databases, in which a cell was a framing
+        return json.dumps({"framings": self.cells, "techniques": self.techniques})
 
     @cached_property
     def images_by_sha256(self) -> dict[str, Image]:
         return {image.sha256: image for image in self.manifest.images}
 
-    def image(self, framing: str, technique: str) -> Image:
-        return self.manifest.image(framing, technique)
+    def image(self, cell: str, technique: str) -> Image:
+        return self.manifest.image(cell, technique)
+
+    @property
+    def consent(self) -> tuple[str, ...]:
+        """The paragraphs of the consent text, with what is asked and stored filled in."""
+        questions = self.asked.questions
+        low, high = (max(1, round(questions * seconds / 60)) for seconds in SECONDS_A_QUESTION)
+        filled = {
+            "questions": str(questions),
+            "minutes": str(low) if low == high else f"{low} to {high}",
+            "recorded": RECORDED,
+        }
+        text = self.asked.consent
+        for name, value in filled.items():
+            text = text.replace(f"{{{name}}}", value)
+        return tuple(text.split("\n\n"))
 
     def database_url(self, simulated: bool) -> str:
         return (

@@ -86,9 +86,8 @@ def _digest(path: Path, _mtime_ns: int, _size: int) -> str:
 def style() -> Response:
     """The aspect ratio of each framing's images (the content policy allows no inline styles)."""
     definition = study()
-    images = [
-        definition.image(framing, definition.techniques[0]) for framing in definition.framings
-    ]
+    first = {image.framing: image for image in reversed(definition.manifest.images)}
+    images = [first[framing] for framing in definition.framings]
     rules = (
         f'[data-framing="{i}"] {{ --ratio: {image.width / image.height:.6f}; }}\n'
         for i, image in enumerate(images)

@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 import renderer
-from stimuli.heads import load_head
+from stimuli import scenes
 
 ROUNDS = 5
 
@@ -22,17 +22,17 @@ ROUNDS = 5
 def main() -> None:
     techniques = {name: renderer.make(name) for name in renderer.TECHNIQUES}
     start = time.perf_counter(), time.process_time()
-    head = load_head()
+    staged = scenes.stage(scenes.read_scene(scenes.load_table("thesis")))
     loaded = time.perf_counter() - start[0], time.process_time() - start[1]
-    with renderer.Renderer(head.model) as drawing:
+    with renderer.Renderer(staged.graph) as drawing:
         print(
             f"{drawing.info()['gl_renderer']}, 1920x1080, 2x2 supersampling, {ROUNDS} rounds "
             "in turn, medians"
         )
         print(f"head: {loaded[0]:.1f} s wall, {loaded[1]:.1f} s CPU")
-        for framing in renderer.FRAMINGS:
+        for framing, camera in renderer.FRAMINGS.items():
             start = time.perf_counter(), time.process_time()
-            frame = drawing.frame(framing)
+            frame = drawing.frame(camera)
             shared = time.perf_counter() - start[0], time.process_time() - start[1]
             samples = {}
             for name, technique in techniques.items():

@@ -16,9 +16,11 @@ if sys.platform == "linux":
 VERSION = "0.1.0"
 _WHERE = {
     "Renderer": "renderer.frame",
+    "driver": "renderer.frame",
     "TECHNIQUES": "renderer.techniques",
     "make": "renderer.techniques",
-    "FRAMINGS": "renderer.scene",
+    "FRAMINGS": "renderer.scene.camera",
+    "ANGLES": "renderer.scene.camera",
 }
 
 

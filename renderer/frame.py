@@ -1,54 +1,70 @@
-"""The frame: shared passes once per framing,
-then any number of techniques over the same buffers.
-"""
+"""The renderer of one scene, and its frames: shared passes once, then any number of techniques."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
-from OpenGL import GL
+import pyrender
 
-from renderer import VERSION, bake, gl, scene
+from renderer import VERSION, gl
 from renderer.errors import InputError
-from renderer.profiles import gaussians
-from renderer.techniques.base import Inputs, Technique
+from renderer.gl import GL
+from renderer.passes.composite import composite
+from renderer.passes.environment import Surroundings
+from renderer.passes.hair import Hair
+from renderer.passes.lamps import Lamps
+from renderer.passes.surfaces import FORMATS, PLACED_FORMATS, Drawn, Surfaces
+from renderer.scene import graph as graphs
+from renderer.scene.camera import Camera
+from renderer.scene.picture import Picture
+from renderer.scene.view import View, main_camera, resolve
+from renderer.techniques.base import Inputs, Technique, output_formats
 
-LAMP_MAP = 4096
-EXPOSURE = 0.76
-BACKDROP = ((0.115, 0.120, 0.130), (0.022, 0.024, 0.028))  # radiance at the centre and at the edge
-THICKNESS_SCALE = 0.38  # mm of slab per mm of depth-map thickness
-TRANSMISSION_WRAP = 0.10  # E = saturate(wrap + L . -N): 0 is exact, the published shader uses 0.3
-HAIR_EXTINCTION = 1.5
+SHADOW_MAP = 4096
 SIZE_LIMIT = 8192  # pixels of a side after supersampling
 
 
 @dataclass(frozen=True)
 class Result:
-    """image (H, W, 3) uint8 sRGB; samples (H s, W s) uint8, 0 where no scattering material is seen;
-    contrast (H s, W s) float32 in [0, 1], or None where the technique measures none."""
+    """The image of a technique and what it took.
+
+    image (H, W, 3) uint8 sRGB; samples (H s, W s) uint16, 0 where no scattering material is seen;
+    contrast (H s, W s) float32 in [0, 1], or None where the technique measures none.
+    """
 
     image: np.ndarray
     samples: np.ndarray
     contrast: np.ndarray | None
 
 
-class Renderer:
-    """One OpenGL context with one model in it.
+def driver() -> dict:
+    """What OpenGL says of itself here, and the renderer's version: `Renderer.info` of any scene."""
+    context = gl.Context()
+    try:
+        return {"version": VERSION, **context.info}
+    finally:
+        context.close()
 
-    size: (width, height) of the images; supersample: 1 to 4 samples a pixel along each side; seed:
-    of the solid noise and of the bake; rays: of the bake, per vertex.
+
+class Renderer:
+    """One OpenGL context with one scene in it; use it as a context manager, or close() it.
+
+    scene: a renderer.scene.graph.SceneGraph, or any pyrender.Scene. size: (width, height) of the
+    images; supersample: 1 to 4 samples a pixel along each side; seed: of the solid noise and of
+    the baked light; rays: of the bake, per vertex; shadow_map: pixels of a lamp's map.
     """
 
     def __init__(
         self,
-        model: scene.Model,
+        scene: pyrender.Scene,
         size: tuple[int, int] = (1920, 1080),
         supersample: int = 2,
         seed: int = 0,
         rays: int = 144,
-        studio: scene.Studio = scene.STUDIO,
+        shadow_map: int = SHADOW_MAP,
     ):
         width, height = size
         if min(width, height) < 16 or max(width, height) * supersample > SIZE_LIMIT:
@@ -58,335 +74,197 @@ class Renderer:
             )
         if supersample not in (1, 2, 3, 4):
             raise InputError(f"supersample is {supersample!r}; expected 1, 2, 3 or 4")
-        self.model, self.size, self.supersample, self.seed, self.studio = (
-            model,
-            (width, height),
-            supersample,
-            seed,
-            studio,
-        )
+        found = graphs.contents(scene)
+        if not found.surfaces:
+            raise InputError("the scene has no surface; expected at least one mesh")
+        self.scene, self.size, self.supersample, self.seed = scene, size, supersample, seed
         self.context = gl.Context()
-        self._programs: dict = {}
-        self._upload(rays)
-        self._lamp_maps()
+        try:
+            self._programs: dict = {}
+            self.surroundings = Surroundings(found.environment)
+            self.surfaces = Surfaces(found, found.lights, self.surroundings, rays, seed)
+            base = {drawn.item.mesh: drawn for drawn in self.surfaces.surfaces}
+            self.hair = [Hair(item, base[item.mesh]) for item in found.strands]
+            points = [self.surfaces.vertices(), *(h.points.reshape(-1, 3) for h in self.hair)]
+            everything = np.vstack(points)
+            self.lamps = Lamps(found.lights, everything, shadow_map)
+            self._draw_shadows()
+        except BaseException:
+            self.close()
+            raise
+        subject = getattr(scene, "subject", None)
+        middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
+        self.subject = middle if subject is None else np.asarray(subject, float)
 
-    def __enter__(self) -> Renderer:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_) -> None:
         self.close()
 
     def close(self) -> None:
+        """Free everything: the context and all that was made in it."""
         self.context.close()
 
     def info(self) -> dict:
         """For the manifest: renderer version and what OpenGL says of itself."""
         return {"version": VERSION, **self.context.info}
 
+    @property
+    def media(self) -> list[str | dict]:
+        """The media that scatter in this scene, in the order of their ids (1 first)."""
+        return self.surfaces.media
+
     def program(
-        self, fragment: str, defines: dict | None = None, vertex: str = "shaders/fullscreen.vert"
+        self,
+        fragment: str,
+        defines: dict | None = None,
+        vertex: str = "shaders/fullscreen.vert",
+        geometry: str | None = None,
     ) -> gl.Program:
-        """A program by its fragment shader, compiled once."""
-        key = (fragment, vertex, tuple(sorted((defines or {}).items())))
+        """A program by its shaders, compiled once."""
+        key = (fragment, vertex, geometry, tuple(sorted((defines or {}).items())))
         if key not in self._programs:
-            self._programs[key] = gl.Program(fragment, vertex, defines)
+            self._programs[key] = gl.Program(fragment, vertex, defines, geometry)
         return self._programs[key]
 
-    def _upload(self, rays: int) -> None:
-        skin, model = self.model.skin, self.model
-        proxy = skin.proxy
-        baked, eyes = bake.bake_model(
-            proxy.positions,
-            proxy.normals,
-            proxy.faces,
-            proxy.albedo,
-            model.eyes,
-            self.studio,
-            rays,
-            self.seed,
-        )
-        light = proxy.to_full @ baked.light.reshape(-1, 9)
-        openness = proxy.to_full @ baked.openness[:, None]
-        self._skin_light = light
-        scatters = np.ones(len(skin.positions)) if skin.scatters is None else skin.scatters
-        self._skin = gl.Mesh(
-            {
-                0: skin.positions,
-                1: skin.normals,
-                2: skin.uvs,
-                3: skin.masks[:, :4],
-                4: skin.masks[:, 4:],
-                5: light[:, 0:3],
-                6: light[:, 3:6],
-                7: light[:, 6:9],
-                8: np.column_stack([openness, scatters]),
-            },
-            skin.faces,
-        )
-        self._eyes = []
-        for eye, lit in zip(model.eyes, eyes, strict=True):
-            n, flat = len(eye.positions), lit.light.reshape(-1, 9)
-            self._eyes.append(
-                gl.Mesh(
-                    {
-                        0: eye.positions,
-                        1: eye.normals,
-                        2: np.zeros((n, 2)),
-                        3: np.zeros((n, 4)),
-                        4: np.zeros((n, 4)),
-                        5: flat[:, 0:3],
-                        6: flat[:, 3:6],
-                        7: flat[:, 6:9],
-                        8: np.column_stack([lit.openness, np.zeros(n)]),
-                    },
-                    eye.faces,
-                )
-            )
-        self._maps = {}
-        for name, image in (
-            ("albedo_map", skin.albedo_map),
-            ("normal_map", skin.normal_map),
-            ("roughness_map", skin.roughness_map),
-        ):
-            if image is None:
-                self._maps[name] = gl.Texture(1, 1, GL.GL_RGBA8)
-                continue
-            if image.ndim == 2:
-                image = np.repeat(image[..., None], 3, axis=2)
-            rgba = np.dstack([image, np.full(image.shape[:2], 255, dtype=np.uint8)])[::-1]
-            self._maps[name] = gl.Texture(
-                rgba.shape[1],
-                rgba.shape[0],
-                GL.GL_RGBA8,
-                linear=True,
-                data=rgba,
-                mipmap=True,
-                repeat=True,
-            )
+    def _draw_shadows(self) -> None:
+        def solid(_light, program, shared):
+            self.surfaces.draw_depth(program, shared)
 
-    def _lamp_maps(self) -> None:
-        """Linear depth from each lamp, mm: solid surfaces (also the thickness of skin), and strands
-        apart.
-        """
-        strands = self.model.strands
-        far = [1e6, 0.0, 0.0, 0.0]
-        points = [self.model.skin.positions, *(eye.positions for eye in self.model.eyes)]
-        if strands is not None:
-            points.append(strands.points.reshape(-1, 3))
-        everything = np.vstack(points)
-        self._lamps = []
-        program = self.program("passes/shadow.frag", vertex="passes/shadow.vert")
-        for lamp in self.studio.lamps:
-            matrix = scene.lamp_matrix(lamp, everything)
-            solid = gl.Target(
-                LAMP_MAP, LAMP_MAP, [GL.GL_R32F], depth=self._lamps[0][1] if self._lamps else True
-            )
-            solid.bind(clear=far, depth_test=True)
-            program.use(lamp=matrix)
-            self._skin.draw()
-            for eye in self._eyes:
-                eye.draw()
-            hair = gl.Target(
-                LAMP_MAP, LAMP_MAP, [GL.GL_R32F], depth=self._lamps[0][1] if self._lamps else solid
-            )
-            hair.bind(clear=far, depth_test=True)
-            if strands is not None:
-                ribbons = self._ribbons(lamp.towards, 0.16)
+        def strands(light, program, shared):
+            for hair in self.hair:
+                ribbons = hair.shadow_ribbons(light)
+                program.use(**shared, model=np.eye(4))
                 ribbons.draw()
                 ribbons.delete()
-            self._lamps.append((matrix, solid, hair))
 
-    def _ribbons(self, facing: np.ndarray, width_mm: float) -> gl.Mesh:
-        """The strands as flat ribbons towards a lamp, for its shadow map."""
-        points = self.model.strands.points.astype(np.float32)
-        tangent = np.gradient(points, axis=1)
-        across = np.cross(tangent, facing.astype(np.float32))
-        across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-6)
-        taper = np.linspace(1.0, 0.4, points.shape[1], dtype=np.float32)[None, :, None]
-        both = np.stack(
-            [points - 0.5 * width_mm * taper * across, points + 0.5 * width_mm * taper * across],
-            axis=2,
+        self.lamps.draw(
+            self.program("passes/shadow.frag", vertex="passes/shadow.vert"), solid, strands
         )
-        return gl.Mesh({0: both.reshape(-1, 3)}, ribbon_faces(*points.shape[:2]))
 
-    def frame(self, framing: str) -> Frame:
-        """Draw what all techniques share for one framing, by name."""
-        if framing not in scene.FRAMINGS:
-            raise InputError(f"no framing {framing!r}; expected one of {', '.join(scene.FRAMINGS)}")
+    def frame(self, camera: Camera | None = None, picture: Picture | None = None) -> Frame:
+        """Draw what all techniques share for one camera; by default the scene's own.
+
+        picture: exposure, tone map and backdrop; by default the scene's own.
+        """
         self.context.make_current()
-        return Frame(self, framing)
+        width, height = (side * self.supersample for side in self.size)
+        camera = camera or getattr(self.scene, "camera", None)
+        if camera is None:
+            view = main_camera(self.scene, width, height)
+        else:
+            view = resolve(camera, self.subject, width, height)
+        picture = picture or getattr(self.scene, "picture", None) or Picture()
+        return Frame(self, view, picture)
 
+    def placed(
+        self,
+        drawn: Drawn,
+        domain: str,
+        size: tuple[int, int],
+        mesh: gl.Mesh | None = None,
+        point_mm: float = 1.0,
+    ) -> gl.Target:
+        """A surface's light over its texture atlas ("ATLAS") or over points on it ("POINTS").
 
-def ribbon_faces(strands: int, points: int) -> np.ndarray:
-    """Triangles (2 S (P - 1), 3) of S ribbons of P point pairs, strand by strand."""
-    base = (np.arange(strands)[:, None] * points + np.arange(points - 1)[None]).ravel() * 2
-    return np.stack([base, base + 1, base + 2, base + 1, base + 3, base + 2], axis=1).reshape(-1, 3)
+        size: (width, height) in texels; mesh: the points, from `surfaces.points`; point_mm: what a
+        point stands for, finer relief fades. The target has PLACED_FORMATS; the caller frees it.
+        Specular light is that towards the subject's front, and means nothing here.
+        """
+        self.context.make_current()
+        target = gl.Target(*size, list(PLACED_FORMATS), depth=domain == "ATLAS")
+        target.bind(clear=(0.0, 0.0, 0.0, 0.0))
+        shared = {
+            "camera_position": self.subject + [0.0, 0.0, 1e4],
+            "view": np.eye(4),
+            "projection": np.eye(4),
+            "points_size": size,
+            "point_mm": point_mm,
+        }
+        GL.glEnable(GL.GL_PROGRAM_POINT_SIZE)
+        self.surfaces.draw(self.program, self.lamps, self.surroundings, shared, domain, drawn, mesh)
+        return target
 
 
 class Frame:
-    """The shared buffers of one framing. They stay until close() or the next frame's end."""
+    """The shared buffers of one view; use it as a context manager, or close() it.
 
-    def __init__(self, renderer: Renderer, framing: str):
-        self.renderer, self.framing = renderer, framing
+    surface.textures: irradiance (alpha: the medium's id), specular, albedo, depth and normal,
+    transmitted light; all at the size of the image times the supersampling.
+    """
+
+    def __init__(self, renderer: Renderer, view: View, picture: Picture):
+        self.renderer, self.view, self.picture = renderer, view, picture
         s = renderer.supersample
         self.width, self.height = renderer.size[0] * s, renderer.size[1] * s
-        self.view = scene.resolve(
-            scene.FRAMINGS[framing],
-            renderer.model.landmarks,
-            self.width,
-            self.height,
-            renderer.studio,
-        )
+        self._given: dict[tuple[int, bool], gl.Target] = {}
+        self._shared = {
+            "camera_position": view.eye,
+            "view": view.view,
+            "projection": view.projection,
+        }
         self._draw_surfaces()
         self._draw_hair()
-        self._lit_through: gl.Target | None = None
         gl.finish()
 
-    def _lighting(self) -> dict:
-        lamps = self.renderer._lamps
-        return {
-            "camera_position": self.view.eye,
-            **self.renderer.studio.uniforms(),
-            "lamp_matrix": np.array([m for m, _, _ in lamps]),
-            "lamp_depth_0": lamps[0][1].textures[0],
-            "lamp_depth_1": lamps[1][1].textures[0],
-            "lamp_strands_0": lamps[0][2].textures[0],
-            "lamp_strands_1": lamps[1][2].textures[0],
-            "view": self.view.view,
-            "projection": self.view.projection,
-        }
+    def __enter__(self) -> Self:
+        return self
 
-    def _defines(self) -> dict:
-        return {"LAMPS": len(self.renderer.studio.lamps), "LOBES": len(self.renderer.studio.lobes)}
+    def __exit__(self, *_) -> None:
+        self.close()
 
     def _draw_surfaces(self) -> None:
-        r, model = self.renderer, self.renderer.model
-        self.surface = gl.Target(
-            self.width,
-            self.height,
-            [GL.GL_RGBA32F, GL.GL_RGBA16F, GL.GL_RGBA16F, GL.GL_RGBA32F, GL.GL_RGBA16F],
-            depth=True,
-        )
+        r = self.renderer
+        self.surface = gl.Target(self.width, self.height, list(FORMATS), depth=True)
         self.surface.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True)
+        # depth first: the shading passes then touch each pixel once
         GL.glColorMask(False, False, False, False)
-        depth = r.program("passes/depth.frag", vertex="passes/surface.vert")
-        depth.use(view=self.view.view, projection=self.view.projection)
-        r._skin.draw()
-        for eye in r._eyes:
-            eye.draw()
+        depth = r.program("passes/depth.frag", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert")
+        r.surfaces.draw_depth(depth, self._shared)
         GL.glColorMask(True, True, True, True)
-        shared = self._lighting()
-        skin = r.program("passes/skin.frag", self._defines(), vertex="passes/surface.vert")
-        rng = np.random.default_rng([r.seed, 3])
-        where = {name: model.landmarks[name] for name in ("eye_l", "eye_r", "mouth", "nose")}
-        values = dict(
-            **shared,
-            **where,
-            procedural=int(model.procedural),
-            noise_origin=rng.uniform(100, 900, 3),
-            has_albedo_map=model.skin.albedo_map is not None,
-            has_normal_map=model.skin.normal_map is not None,
-            has_roughness_map=model.skin.roughness_map is not None,
-            base_colour=model.skin.base_colour or (0.5, 0.5, 0.5),
-            gaussian_falloff=0.5 / gaussians.SKIN_VARIANCE_MM2,
-            gaussian_weight=gaussians.SKIN_WEIGHTS,
-            thickness_scale=THICKNESS_SCALE,
-            transmission_wrap=TRANSMISSION_WRAP,
-            **r._maps,
-        )
-        skin.use(**skin.accepts(values))
-        r._skin.draw()
-        program = r.program("passes/eye.frag", self._defines(), vertex="passes/surface.vert")
-        for eye, mesh in zip(model.eyes, r._eyes, strict=True):
-            program.use(
-                **program.accepts(
-                    dict(
-                        shared,
-                        centre=eye.centre,
-                        gaze=eye.gaze,
-                        radius=eye.radius,
-                        iris_radius=eye.iris_radius,
-                    )
-                )
-            )
-            mesh.draw()
+        r.surfaces.draw(r.program, r.lamps, r.surroundings, self._shared)
 
     def _draw_hair(self) -> None:
-        r, strands = self.renderer, self.renderer.model.strands
+        r = self.renderer
         self.hair = gl.Target(self.width, self.height, [GL.GL_RGBA16F], depth=self.surface)
         self.hair.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True, blend="over")
-        if strands is None:
-            return
-        distance = np.linalg.norm(strands.points.mean(axis=1) - self.view.eye, axis=1)
-        order = np.argsort(-distance, kind="stable")  # far strands first: blended back to front
-        points = strands.points[order].astype(np.float32)
-        n, p = points.shape[:2]
-        tangent = np.gradient(points, axis=1)  # float32, as the points
-        tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-6)
-        root = strands.root_vertex[order]
-        normal = r.model.skin.normals[root]
-        light = r._skin_light[root].reshape(n, 3, 3)
-        environment = np.maximum(np.einsum("nci,ni->nc", light, normal), 0)
+        for hair in r.hair:
+            hair.draw(r.program, r.lamps, r.surroundings, self._shared, self.view.pixels_per_mm)
 
-        def twice(array: np.ndarray) -> np.ndarray:
-            return np.repeat(array.reshape(n * p, -1).astype(np.float32), 2, axis=0)
+    def irradiance(self, translucent: bool, medium: int = 1) -> gl.Texture:
+        """The input of the techniques: irradiance, alpha 1 where this medium scatters.
 
-        side = np.tile([-1.0, 1.0], n * p)[:, None]
-        width = twice(np.repeat(strands.width_mm[order][:, None], p, axis=1))
-        along = twice(np.tile(np.linspace(0, 1, p), (n, 1)))
-        per_strand = lambda a: twice(np.repeat(a[:, None, :], p, axis=1))
-        mesh = gl.Mesh(
-            {
-                0: twice(points),
-                1: twice(tangent),
-                2: np.hstack([side, width, twice(strands.cover[order]), along]),
-                3: per_strand(strands.colour[order]),
-                4: per_strand(environment),
-                5: per_strand(normal),
-            },
-            ribbon_faces(n, p),
-        )
-        program = r.program("passes/hair.frag", self._defines(), vertex="passes/hair.vert")
-        program.use(
-            **program.accepts(
-                dict(
-                    self._lighting(),
-                    pixels_per_mm=self.view.pixels_per_mm,
-                    minimum_px=1.3,
-                    extinction=HAIR_EXTINCTION,
-                )
-            )
-        )
-        mesh.draw()
-        mesh.delete()
-
-    def irradiance(self, translucent: bool) -> gl.Texture:
-        """The input of the techniques: irradiance, with the transmitted light of Jimenez 2010 added
-        or not.
+        translucent: with the transmitted light of Jimenez 2010 added.
         """
-        if not translucent:
+        if not translucent and len(self.renderer.media) <= 1:
             return self.surface.textures[0]
-        if self._lit_through is None:
-            self._lit_through = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
-            self._lit_through.bind()
+        if (medium, translucent) not in self._given:
+            target = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
+            target.bind()
             self.renderer.program("passes/add.frag").use(
-                irradiance=self.surface.textures[0], transmitted=self.surface.textures[4]
+                irradiance=self.surface.textures[0],
+                transmitted=self.surface.textures[4],
+                medium=float(medium),
+                through=float(translucent),
             )
             gl.draw_fullscreen(self.renderer.context)
-        return self._lit_through.textures[0]
+            self._given[medium, translucent] = target
+        return self._given[medium, translucent].textures[0]
 
     def inputs(
         self,
         translucent: bool,
         irradiance: gl.Texture | None = None,
         depth_normal: gl.Texture | None = None,
+        medium: int = 1,
     ) -> Inputs:
         """What a technique gets; the textures can be replaced (tests use a flat patch)."""
         r = self.renderer
         return Inputs(
             r.context,
             r.program,
-            irradiance or self.irradiance(translucent),
+            irradiance or self.irradiance(translucent, medium),
             depth_normal or self.surface.textures[3],
             self.width,
             self.height,
@@ -394,41 +272,52 @@ class Frame:
             r.supersample,
         )
 
+    def scatter(self, technique: Technique) -> gl.Target:
+        """Scattered irradiance and counts of all media: one pass of the technique for each."""
+        media = range(1, max(1, len(self.renderer.media)) + 1)
+        first = technique.scatter(self.inputs(technique.translucent, medium=1)).target
+        if len(media) == 1:
+            return first
+        total = gl.Target(self.width, self.height, output_formats())
+        total.bind(clear=(0.0, 0.0, 0.0, 0.0))
+        self.renderer.program("passes/copy.frag").use(source=self.surface.textures[0])
+        GL.glDrawBuffers(1, [GL.GL_COLOR_ATTACHMENT0])
+        gl.draw_fullscreen(self.renderer.context)
+        GL.glDrawBuffers(2, [GL.GL_COLOR_ATTACHMENT0, GL.GL_COLOR_ATTACHMENT1])
+        for medium in media:
+            if medium > 1:
+                first = technique.scatter(self.inputs(technique.translucent, medium=medium)).target
+            total.bind()
+            self.renderer.program("passes/pick.frag").use(
+                irradiance=self.surface.textures[0],
+                scattered=first.textures[0],
+                count=first.textures[1],
+                medium=float(medium),
+            )
+            gl.draw_fullscreen(self.renderer.context)
+            first.delete()
+        return total
+
     def render(self, technique: Technique) -> Result:
         """The image of one technique."""
         r = self.renderer
         r.context.make_current()
-        scattered = technique.scatter(self.inputs(technique.translucent))
-        light, info = scattered.target.textures
-        colour = gl.Target(self.width, self.height, [GL.GL_RGBA16F])
-        colour.bind()
-        surface = self.surface.textures
-        r.program("passes/composite.frag").use(
-            scattered=light,
-            specular=surface[1],
-            albedo=surface[2],
-            depth_normal=surface[3],
-            hair=self.hair.textures[0],
-            exposure=EXPOSURE,
-            backdrop_centre=BACKDROP[0],
-            backdrop_edge=BACKDROP[1],
-            aspect=self.width / self.height,
-        )
-        gl.draw_fullscreen(r.context)
-        final = gl.Target(*r.size, [GL.GL_RGBA32F])
-        final.bind()
-        r.program("passes/resolve.frag").use(colour_map=colour.textures[0], factor=r.supersample)
-        gl.draw_fullscreen(r.context)
-        image = np.rint(final.textures[0].read()[..., :3] * 255).astype(np.uint8)
-        counts = info.read()
-        result = Result(
-            image,
-            np.rint(counts[..., 0]).astype(np.uint8),
-            counts[..., 1].copy() if technique.measures_contrast else None,
-        )
-        for target in (scattered.target, colour, final):
-            target.delete()
-        return result
+        with self.scatter(technique) as scattered:
+            light, info = scattered.textures
+            image = composite(
+                r.context,
+                r.program,
+                light,
+                self.surface,
+                self.hair,
+                self.picture,
+                self.view,
+                r.surroundings,
+                r.supersample,
+            )
+            counts = info.read()
+        contrast = counts[..., 1].copy() if technique.measures_contrast else None
+        return Result(image, np.rint(counts[..., 0]).astype(np.uint16), contrast)
 
     def time(self, techniques: dict[str, Technique], rounds: int) -> dict[str, np.ndarray]:
         """Seconds that scattering alone takes: name -> (rounds, 2) of wall and CPU time.
@@ -440,17 +329,19 @@ class Frame:
         spent = {name: np.empty((rounds, 2)) for name in techniques}
         for k in range(-1, rounds):
             for name, technique in techniques.items():
-                inputs = self.inputs(technique.translucent)
+                self.irradiance(technique.translucent)
                 gl.finish()
                 start = np.array([time.perf_counter(), time.process_time()])
-                scattered = technique.scatter(inputs)
+                scattered = self.scatter(technique)
                 gl.finish()
                 if k >= 0:
                     spent[name][k] = np.array([time.perf_counter(), time.process_time()]) - start
-                scattered.target.delete()
+                scattered.delete()
         return spent
 
     def close(self) -> None:
         """Free the shared buffers."""
-        for target in filter(None, (self._lit_through, self.hair, self.surface)):
+        self.renderer.context.make_current()
+        for target in (*self._given.values(), self.hair, self.surface):
             target.delete()
+        self._given.clear()

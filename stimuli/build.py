@@ -15,39 +15,42 @@ import subprocess
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stimuli import manifest
+from stimuli import manifest, sources
 from stimuli.errors import InputError, Stopped
-from stimuli.study import Study
+from stimuli.scenes import PEOPLE
+from stimuli.study import FRAMING, Cell, Study
 
 STATE = "build.json"
-STATE_FORMAT = "subdermal-build/1"
+MAPS = ("albedo_map", "normal_map", "roughness_map")
+STATE_FORMAT = "subdermal-build/2"
 _ROOT = Path(__file__).resolve().parents[1]
-_SOURCES = (_ROOT / "renderer", _ROOT / "stimuli" / "heads")
 
 
 @dataclass(frozen=True)
 class Stimulus:
-    """An image to make: `parameters` is the validated dataclass of its technique,
-    `key` a sha256.
+    """An image to make.
+
+    `parameters` is the validated dataclass of its technique, `scene` the checked scene of its cell,
+    `key` a sha256 of all that it is made from.
     """
 
-    framing: str
+    cell: Cell
     condition: str
     parameters: Any
+    scene: Any
     file: str
     key: str
 
 
 @dataclass(frozen=True)
 class Built:
-    """How many images a build rendered, how many it found up to date, and what there is to say of
-    the head.
-    """
+    """How many images a build rendered, how many it found up to date, and what there is to say."""
 
     rendered: int
     kept: int
@@ -57,47 +60,145 @@ class Built:
 def build(
     study: Study, out: str | Path, force: bool = False, progress: bool = False, rounds: int = 0
 ) -> Built:
-    """Render what is missing or out of date of the study's images into `out`, and write the
-    manifest.
+    """Render what is missing or out of date of the study's images, and write the manifest.
 
     `force` renders every image anew; `progress` shows a bar on stderr. `rounds` also times every
     technique so often and puts the median milliseconds of scattering alone into the manifest: they
     differ from run to run. Images of one study come from one OpenGL driver: when it differs from
     that of the finished images, these are rendered anew as well.
+
+    A scene is put up once for all its cameras, and freed before the next.
     """
     out = Path(out)
     parameters = resolve(study)
     state = _read_state(out)
-
-    from renderer import Renderer
-    from stimuli.heads import load_head
-
-    head = load_head(study.head.name, study.head.unit, study.render.seed, study.head.up)
-    plan = _plan(study, parameters, head.provenance)
+    plan = _plan(study, parameters)
     (out / "images").mkdir(parents=True, exist_ok=True)
     kept = set() if force else {s.file for s in plan if _is_finished(out, s, state)}
+    work = _Work(study, out, state, plan, kept, rounds)
     if len(kept) < len(plan) or rounds:
-        render = study.render
-        with Renderer(
-            head.model, size=render.size, supersample=render.supersample, seed=render.seed
-        ) as drawing:
-            driver = drawing.info()
-            kept = {file for file in kept if _same_driver(state[file]["image"]["renderer"], driver)}
-            todo = [s for s in plan if s.file not in kept]
-            (out / manifest.NAME).unlink(missing_ok=True)
-            entry = {"renderer": {**driver, "commit": commit()}, "head": head.provenance}
-            _render(study, todo, drawing, out, state, entry, progress)
-            if rounds:
-                _time(plan, drawing, out, state, rounds)
+        work.run(progress)
     _remove_strays(out, state, {s.file for s in plan})
+    done = [state[s.file] for s in plan]
+    licences = _distinct(entry for one in done for entry in one["licences"])
+    notes = _distinct(note for one in done for note in one["notes"])
     record = {
         "format": manifest.FORMAT,
         "study": study.record(),
         "images": [state[s.file]["image"] for s in plan],
-        "licences": head.licences,
+        "licences": licences,
     }
     _write_json(out / manifest.NAME, record)
-    return Built(rendered=len(plan) - len(kept), kept=len(kept), notes=head.notes)
+    return Built(len(work.rendered), len(plan) - len(work.rendered), tuple(notes))
+
+
+class _Work:
+    """One build: which images are left, and what was found on the way."""
+
+    def __init__(
+        self,
+        study: Study,
+        out: Path,
+        state: dict,
+        plan: list[Stimulus],
+        kept: set[str],
+        rounds: int,
+    ):
+        self.study, self.out, self.state, self.plan = study, out, state, plan
+        self.kept, self.rounds = kept, rounds
+        self.rendered: set[str] = set()
+
+    def run(self, progress: bool) -> None:
+        """Draw what is left, scene by scene."""
+        from tqdm import tqdm
+
+        import renderer
+
+        driver = renderer.driver()
+        by = {file: self.state[file]["image"]["renderer"] for file in self.kept}
+        self.kept = {file for file in self.kept if _same_driver(by[file], driver)}
+        todo = [s.file for s in self.plan if s.file not in self.kept]
+        if todo:
+            (self.out / manifest.NAME).unlink(missing_ok=True)
+        scenes: dict[str, list[Stimulus]] = {}
+        for stimulus in self.plan:
+            if self.rounds or stimulus.file not in self.kept:
+                scenes.setdefault(_place(stimulus.scene), []).append(stimulus)
+        try:
+            with tqdm(total=len(todo), desc="rendering", unit="image", disable=not progress) as bar:
+                for stimuli in scenes.values():
+                    self._scene(stimuli, bar)
+        except KeyboardInterrupt as error:
+            raise Stopped(
+                f"stopped with {len(self.rendered)} of {len(todo)} images rendered; `subdermal "
+                "build` without --force goes on from there"
+            ) from error
+
+    def _scene(self, stimuli: list[Stimulus], bar: Any) -> None:
+        """Put up one scene and draw what is left of its images."""
+        from renderer import Renderer
+        from stimuli.scenes import stage
+
+        render = self.study.render
+        staged = stage(stimuli[0].scene, render.seed)
+        with Renderer(
+            staged.graph, size=render.size, supersample=render.supersample, seed=render.seed
+        ) as drawing:
+            entry = {"renderer": {**drawing.info(), "commit": commit()}, "head": staged.provenance}
+            for cell in _by_cell(stimuli):
+                scene = cell[0].scene
+                with drawing.frame(scene.camera, scene.picture) as frame:
+                    for stimulus in cell:
+                        if stimulus.file in self.kept:
+                            continue
+                        bar.set_postfix_str(f"{stimulus.cell.name}, {stimulus.condition}")
+                        self._image(stimulus, frame, entry, staged)
+                        bar.update()
+                    if self.rounds:
+                        self._time(cell, frame)
+
+    def _image(self, stimulus: Stimulus, frame: Any, entry: dict, staged: Any) -> None:
+        """Render one image and record it: it is there whatever comes after."""
+        render = self.study.render
+        result = frame.render(stimulus.parameters)
+        digest = _write_png(self.out / stimulus.file, result.image, render.size)
+        technique = {c.name: c.technique for c in self.study.techniques}[stimulus.condition]
+        further = {k: v for k, v in stimulus.cell.levels.items() if k != FRAMING}
+        image = {
+            "framing": stimulus.cell.framing,
+            **({"levels": further} if further else {}),
+            "technique": stimulus.condition,
+            "file": stimulus.file,
+            "width": render.size[0],
+            "height": render.size[1],
+            "sha256": digest,
+            "parameters": {
+                "technique": technique,
+                "supersample": render.supersample,
+                **_jsonable(stimulus.parameters),
+            },
+            "scene": _described(stimulus.scene),
+            "seed": render.seed,
+            "measures": {"samples_per_pixel": samples_per_pixel(result.samples)},
+            **entry,
+        }
+        done = {
+            "key": stimulus.key,
+            "image": image,
+            "licences": staged.licences,
+            "notes": list(staged.notes),
+        }
+        self.state[stimulus.file] = done
+        self.rendered.add(stimulus.file)
+        _write_json(self.out / STATE, {"format": STATE_FORMAT, "images": self.state})
+
+    def _time(self, stimuli: list[Stimulus], frame: Any) -> None:
+        """Put each image's median milliseconds of scattering into its measures."""
+        shown = {s.file: s.parameters for s in stimuli}
+        for file, spent in frame.time(shown, self.rounds).items():
+            measures = self.state[file]["image"]["measures"]
+            measures["milliseconds"] = round(1000 * float(np.median(spent[:, 0])), 1)
+        _write_json(self.out / STATE, {"format": STATE_FORMAT, "images": self.state})
 
 
 def resolve(study: Study) -> dict[str, Any]:
@@ -105,12 +206,6 @@ def resolve(study: Study) -> dict[str, Any]:
     import renderer
     import renderer.errors
 
-    for i, framing in enumerate(study.framings):
-        if framing.name not in renderer.FRAMINGS:
-            raise InputError(
-                f"study {study.name}: framings[{i}].name: got {framing.name!r}, expected one "
-                f"of {', '.join(renderer.FRAMINGS)}"
-            )
     resolved = {}
     for i, condition in enumerate(study.techniques):
         try:
@@ -120,6 +215,20 @@ def resolve(study: Study) -> dict[str, Any]:
         except renderer.errors.InputError as error:
             raise InputError(f"study {study.name}: techniques[{i}]: {error}") from error
     return resolved
+
+
+def scenes_of(study: Study) -> dict[str, Any]:
+    """The checked scene of each cell, by the cell's name; InputError names the key at fault."""
+    from renderer.errors import InputError as SceneError
+    from stimuli.scenes import read_scene
+
+    found = {}
+    for cell in study.cells:
+        try:
+            found[cell.name] = read_scene(study.scene_of(cell), f"{cell.name}: scene")
+        except (SceneError, InputError) as error:
+            raise InputError(f"study {study.name}: {error}") from error
+    return found
 
 
 def samples_per_pixel(samples: np.ndarray) -> float:
@@ -150,41 +259,79 @@ def commit() -> str | None:
     )
 
 
-def _plan(study: Study, parameters: dict[str, Any], provenance: dict) -> list[Stimulus]:
-    """Every image of the study, framing by framing."""
-    common = {
-        "render": dataclasses.asdict(study.render),
-        "head": provenance,
-        "source": _source_digest(),
-    }
+def _plan(study: Study, parameters: dict[str, Any]) -> list[Stimulus]:
+    """Every image of the study, cell by cell."""
+    scenes = scenes_of(study)
+    files = {name: _own_files(scene) for name, scene in scenes.items()}
     plan = []
-    for framing in study.framings:
+    for cell in study.cells:
         for condition in study.techniques:
             chosen = parameters[condition.name]
             made_from = {
-                **common,
-                "framing": framing.name,
+                "render": dataclasses.asdict(study.render),
+                "scene": _described(scenes[cell.name]),
+                "files": files[cell.name],
+                "source": _source(type(chosen).__module__),
                 "technique": condition.technique,
                 "parameters": _jsonable(chosen),
             }
             key = hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
-            file = f"images/{framing.name}_{condition.name}.png"
-            plan.append(Stimulus(framing.name, condition.name, chosen, file, key))
+            file = f"images/{cell.name}_{condition.name}.png"
+            plan.append(Stimulus(cell, condition.name, chosen, scenes[cell.name], file, key))
     return plan
 
 
-def _source_digest() -> str:
-    """The sha256 of all source that shapes an image, and of the renderer's version."""
-    import renderer
+@cache
+def _source(module: str) -> str:
+    return sources.digest(module)
 
-    digest = hashlib.sha256(renderer.VERSION.encode())
-    for folder in _SOURCES:
-        for path in sorted(folder.rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts:
-                digest.update(
-                    path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes()
-                )
-    return digest.hexdigest()
+
+def _own_files(scene: Any) -> list[list[str]]:
+    """The user's files and the people in a scene, each with its sha256."""
+    files = [getattr(thing, "file", "") for thing in scene.objects.values()]
+    files += [getattr(material, key) for material in scene.materials.values() for key in MAPS]
+    files.append(scene.environment.map)
+    for thing in scene.objects.values():
+        if person := getattr(thing, "person", ""):
+            known = PEOPLE / f"{person}.toml"
+            files.append(str(known) if known.is_file() else person)
+    paths = [Path(file) for file in files if file]
+    return [[path.name, manifest.sha256(path)] for path in paths if path.is_file()]
+
+
+def _described(scene: Any) -> dict:
+    """The scene's table; files by their names, since folders are nobody's business."""
+    table = scene.plain()
+    holders = [(entry, ("file",)) for entry in table["objects"].values()]
+    holders += [(entry, MAPS) for entry in table["materials"].values()]
+    for holder, keys in (*holders, (table["environment"], ("map",))):
+        for key in keys:
+            if holder.get(key):
+                holder[key] = Path(holder[key]).name
+    return table
+
+
+def _place(scene: Any) -> str:
+    """What two scenes have in common that differ in camera and picture alone."""
+    table = scene.plain()
+    del table["camera"], table["picture"]
+    return json.dumps(table, sort_keys=True)
+
+
+def _distinct(entries: Iterable) -> list:
+    """The entries without repetition, in order (they need not be hashable)."""
+    found = []
+    for entry in entries:
+        if entry not in found:
+            found.append(entry)
+    return found
+
+
+def _by_cell(group: list[Stimulus]) -> list[list[Stimulus]]:
+    cells: dict[str, list[Stimulus]] = {}
+    for stimulus in group:
+        cells.setdefault(stimulus.cell.name, []).append(stimulus)
+    return list(cells.values())
 
 
 def _is_finished(out: Path, stimulus: Stimulus, state: dict) -> bool:
@@ -196,68 +343,6 @@ def _is_finished(out: Path, stimulus: Stimulus, state: dict) -> bool:
 
 def _same_driver(recorded: dict, driver: dict) -> bool:
     return {**recorded, "commit": None} == {**driver, "commit": None}
-
-
-def _render(
-    study: Study,
-    todo: list[Stimulus],
-    drawing: Any,
-    out: Path,
-    state: dict,
-    entry: dict,
-    progress: bool,
-) -> None:
-    """Render framing by framing, so that the shared passes are drawn once; record each finished
-    image.
-    """
-    from tqdm import tqdm
-
-    techniques = {condition.name: condition.technique for condition in study.techniques}
-    finished = 0
-    try:
-        with tqdm(total=len(todo), desc="rendering", unit="image", disable=not progress) as bar:
-            for framing in dict.fromkeys(s.framing for s in todo):
-                frame = drawing.frame(framing)
-                for stimulus in (s for s in todo if s.framing == framing):
-                    bar.set_postfix_str(f"{framing}, {stimulus.condition}")
-                    result = frame.render(stimulus.parameters)
-                    digest = _write_png(out / stimulus.file, result.image, study.render.size)
-                    image = {
-                        "framing": framing,
-                        "technique": stimulus.condition,
-                        "file": stimulus.file,
-                        "width": study.render.size[0],
-                        "height": study.render.size[1],
-                        "sha256": digest,
-                        "parameters": {
-                            "technique": techniques[stimulus.condition],
-                            "supersample": study.render.supersample,
-                            **_jsonable(stimulus.parameters),
-                        },
-                        "seed": study.render.seed,
-                        "measures": {"samples_per_pixel": samples_per_pixel(result.samples)},
-                        **entry,
-                    }
-                    state[stimulus.file] = {"key": stimulus.key, "image": image}
-                    _write_json(out / STATE, {"format": STATE_FORMAT, "images": state})
-                    finished += 1
-                    bar.update()
-    except KeyboardInterrupt as error:
-        raise Stopped(
-            f"stopped with {finished} of {len(todo)} images rendered; `subdermal build` "
-            "without --force goes on from there"
-        ) from error
-
-
-def _time(plan: list[Stimulus], drawing: Any, out: Path, state: dict, rounds: int) -> None:
-    """Put each image's median milliseconds of scattering into its measures."""
-    for framing in dict.fromkeys(s.framing for s in plan):
-        shown = {s.file: s.parameters for s in plan if s.framing == framing}
-        for file, spent in drawing.frame(framing).time(shown, rounds).items():
-            state[file]["image"]["measures"]["milliseconds"] = round(
-                1000 * float(np.median(spent[:, 0])), 1
-            )
-    _write_json(out / STATE, {"format": STATE_FORMAT, "images": state})
 
 
 def _remove_strays(out: Path, state: dict, wanted: Iterable[str]) -> None:

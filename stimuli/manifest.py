@@ -11,11 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from stimuli.errors import InputError
-from stimuli.study import Study, read_study
+from stimuli.study import FRAMING, Cell, Study, read_study
 from stimuli.table import Table
 
 NAME = "manifest.json"
-FORMAT = "subdermal-manifest/1"
+FORMAT = "subdermal-manifest/2"
+#: What is read: 1 had no factors beside framing.
+FORMATS = ("subdermal-manifest/1", FORMAT)
 #: What `analyse` sets beside worth: samples a pixel where light is scattered, milliseconds an
 #: image, and distances to the reference.
 MEASURES = ("samples_per_pixel", "milliseconds", "dssim", "flip")
@@ -24,13 +26,13 @@ _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".we
 
 @dataclass(frozen=True)
 class Image:
-    """An image of the study. `renderer` and `head` are None where it was made elsewhere.
+    """An image of the study; `renderer`, `head` and `scene` are None where it was made elsewhere.
 
     measures: what it cost and how far it is from the reference, where that is known: see
     `MEASURES`.
     """
 
-    framing: str
+    cell: str
     technique: str
     file: str
     path: Path
@@ -42,6 +44,13 @@ class Image:
     renderer: dict | None = None
     head: dict | None = None
     measures: dict = field(default_factory=dict)
+    levels: dict = field(default_factory=dict)
+    scene: dict | None = None
+
+    @property
+    def framing(self) -> str:
+        """The level of the factor framing."""
+        return self.levels[FRAMING]
 
     @property
     def media_type(self) -> str:
@@ -51,19 +60,19 @@ class Image:
 
 @dataclass(frozen=True)
 class Manifest:
-    """A study and its images, one for each framing and technique."""
+    """A study and its images, one for each cell and technique."""
 
     directory: Path
     study: Study
     images: tuple[Image, ...]
     licences: tuple[dict, ...]
 
-    def image(self, framing: str, technique: str) -> Image:
-        """The image of a technique at a framing; KeyError where the study has no such pair."""
+    def image(self, cell: str, technique: str) -> Image:
+        """The image of a technique in a cell, by its name; KeyError where there is no such pair."""
         for image in self.images:
-            if (image.framing, image.technique) == (framing, technique):
+            if (image.cell, image.technique) == (cell, technique):
                 return image
-        raise KeyError((framing, technique))
+        raise KeyError((cell, technique))
 
 
 def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
@@ -86,7 +95,7 @@ def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
         raise InputError(f"{path}: got {type(value).__name__}, expected a table")
 
     table = Table(value, str(path))
-    table.take("format", str, repr(FORMAT), lambda text: text == FORMAT)
+    table.one_of("format", FORMATS)
     study_table = table.table("study")
     study = read_study(study_table)
     study_table.end()
@@ -126,7 +135,7 @@ def _image(entry: Table, study: Study, directory: Path) -> Image:
         inside,
     )
     image = Image(
-        framing=entry.one_of("framing", (framing.name for framing in study.framings)),
+        cell=_cell(entry, study).name,
         technique=entry.one_of("technique", (condition.name for condition in study.techniques)),
         file=file,
         path=directory / file,
@@ -138,9 +147,25 @@ def _image(entry: Table, study: Study, directory: Path) -> Image:
         renderer=entry.take("renderer", dict, default=None),
         head=entry.take("head", dict, default=None),
         measures=_measures(entry.table("measures", default={})),
+        levels=_cell(entry, study).levels,
+        scene=entry.take("scene", dict, default=None),
     )
     entry.end()
     return image
+
+
+def _cell(entry: Table, study: Study) -> Cell:
+    """The cell of an image: `framing`, and `levels` with the level of each further factor."""
+    framing = entry.one_of("framing", (level.name for level in study.framings))
+    further = entry.table("levels", default={})
+    levels = {FRAMING: framing}
+    for factor in study.factors[1:]:
+        levels[factor.name] = further.one_of(factor.name, (v.name for v in factor.levels))
+    further.end()
+    for cell in study.cells:
+        if cell.levels == levels:
+            return cell
+    raise entry.fault("levels", levels, "levels of one of the study's cells")
 
 
 def _measures(table: Table) -> dict:
@@ -161,16 +186,14 @@ def _is_sha256(text: str) -> bool:
 
 
 def _one_each(study: Study, images: tuple[Image, ...], entries: list[Table], table: Table) -> None:
-    """Each framing and technique has exactly one image, of a file of its own, in one size a
-    framing.
-    """
+    """Each cell and technique has one image, of a file of its own, in one size a framing."""
     seen, files, sizes = {}, {}, {}
     for image, entry in zip(images, entries):
-        pair, size = (image.framing, image.technique), (image.width, image.height)
+        pair, size = (image.cell, image.technique), (image.width, image.height)
         if pair in seen:
             raise InputError(
-                f"{entry.source}: {entry.key}: a second image of {pair[1]} at {pair[0]}, "
-                f"after {seen[pair]}"
+                f"{entry.source}: {entry.key}: a second image of {pair[1]} at {pair[0]}, after "
+                f"{seen[pair]}"
             )
         if image.file in files:
             raise entry.fault(
@@ -183,12 +206,10 @@ def _one_each(study: Study, images: tuple[Image, ...], entries: list[Table], tab
                 f"{sizes[image.framing]}, as the other images at {image.framing}",
             )
         seen[pair] = files[image.file] = entry.key
-    for framing in study.framings:
+    for cell in study.cells:
         for condition in study.techniques:
-            if (framing.name, condition.name) not in seen:
-                raise InputError(
-                    f"{table.source}: images: none of {condition.name} at {framing.name}"
-                )
+            if (cell.name, condition.name) not in seen:
+                raise InputError(f"{table.source}: images: none of {condition.name} at {cell.name}")
 
 
 def _verify(image: Image, entry: Table) -> None:

@@ -1,36 +1,109 @@
 """The definition of a study: what is shown, what is asked, how it is rendered.
 
-A study is a TOML file (studies/thesis.toml is the one to copy). What it asks (`question`, `scale`,
+A study is a TOML file (studies/thesis.toml is the one to copy): a scene, the factors whose levels
+patch it, the conditions that are compared. What it asks (`question`, `scale`,
 `familiarity`, `consent`) may be left out and is then asked as in the thesis; what it declares of
 its analysis (`analysis`: margins, tests, exclusions) may be left out too. Nothing here renders, and
 nothing here knows which techniques and framings there are: `stimuli.build` asks the renderer.
 """
 
+import re
 import tomllib
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import product
+from math import prod
 from pathlib import Path
 
 from stimuli.errors import InputError
+from stimuli.scenes import load_table, merge
 from stimuli.table import Table, refuse_doubles
 
 THESIS = Path(__file__).parent / "studies" / "thesis.toml"
+FRAMING = "framing"
+DEFAULT_HEAD = "default"
+LONGEST_CELL = 100  # what a database keeps
+#: The framing of a study that names none.
+HEAD_SHOT = {"name": "head-shot", "label": "Head shot"}
+#: Factors whose levels can go without `set`: where in the scene's table the level's name stands.
+SHORTHANDS = {
+    FRAMING: ("camera", "framing"),
+    "angle": ("camera", "angle"),
+    "light": ("rig",),
+    "person": ("objects", "head", "person"),
+}
+#: Columns of the table of answers: no factor can have such a name.
+RESERVED = frozenset(
+    {"framing", "participant", "familiarity", "left", "right", "answer", "rt_ms", "timed_by"}
+    | {"times_shown", "started_at", "answered_at", "order", "seed", "simulated", "study"}
+    | {"study_version", "trial", "technique", "image_left_sha256", "image_right_sha256"}
+    | {
+        "completed",
+        "viewport_width",
+        "viewport_height",
+        "device_pixel_ratio",
+        "shown_width",
+        "shown_height",
+    }
+)
+#: What a consent text may say in braces; the page fills it in from what is asked and stored.
+PLACEHOLDERS = ("questions", "minutes", "recorded")
+#: For studies of ready-made images that bring no text of their own.
+CONSENT = (
+    "You will see pairs of images and answer one question about each pair. There are {questions} "
+    "questions; most people need {minutes} minutes, and there is no time limit. What is stored: "
+    "{recorded}. No name, address or other personal detail is asked for. Taking part is voluntary: "
+    "you can close the page at any time. The answers are analysed and published as statistics and "
+    "as an anonymous table."
+)
 UNITS = ("mm", "cm", "m", "in")  # of a scan's coordinates
 AXES = ("y", "z")  # that can point upwards in a scan
-_ASKED = ("question", "scale", "familiarity", "consent")
+_WORDING = ("question", "scale", "familiarity", "consent")
 
 
 @dataclass(frozen=True)
-class Framing:
-    """A distance to the head: its name in files and tables, its label for people."""
+class Level:
+    """A level of a factor: its name in files and tables, its label for people.
+
+    patch: what it changes in the scene's table (stimuli.scenes.merge).
+    """
 
     name: str
     label: str
+    patch: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Factor:
+    """What a study varies beside the conditions: framing, angle, person, light, ..."""
+
+    name: str
+    label: str
+    levels: tuple[Level, ...]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One level of each factor: pairs are compared within it.
+
+    levels: factor -> level, framing first; name: the levels' names joined by dots, so that it is
+    the framing's own where a study varies nothing else.
+    """
+
+    levels: dict[str, str]
+
+    @property
+    def name(self) -> str:
+        return ".".join(self.levels.values())
+
+    @property
+    def framing(self) -> str:
+        return self.levels[FRAMING]
 
 
 @dataclass(frozen=True)
 class Condition:
-    """What is compared within a framing: a technique of the renderer with its parameters."""
+    """What is compared within a cell: a technique of the renderer with its parameters."""
 
     name: str
     label: str
@@ -48,7 +121,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Level:
+class ScalePoint:
     """One answer of the scale: -2 (strongly the left image) to 2 (strongly the right one)."""
 
     value: int
@@ -75,46 +148,83 @@ class Render:
 
 
 @dataclass(frozen=True)
-class HeadChoice:
-    """The head: "default" or the file of a scan; the unit of its coordinates and its upward axis,
-    None to find out.
-    """
-
-    name: str
-    unit: str | None = None
-    up: str | None = None
-
-
-@dataclass(frozen=True)
 class Study:
     """A study.
 
-    `render` and `head` are None where the images are ready-made; `analysis` is what it declares of
-    its analysis.
+    factors: framing first; cells: the combinations of their levels that are shown. `render` and
+    `scene` (the table of the scene that levels patch) are None where the images are ready-made;
+    `analysis` is what it declares of its analysis.
     """
 
     name: str
     title: str
     version: int
     seed: int
-    framings: tuple[Framing, ...]
+    factors: tuple[Factor, ...]
+    cells: tuple[Cell, ...]
     techniques: tuple[Condition, ...]
     question: Question
-    scale: tuple[Level, ...]
+    scale: tuple[ScalePoint, ...]
     familiarity: Familiarity
     consent: str
     render: Render | None = None
-    head: HeadChoice | None = None
+    scene: dict | None = None
     analysis: dict = field(default_factory=dict)
+
+    @property
+    def framings(self) -> tuple[Level, ...]:
+        """The levels of the factor framing, which every study has."""
+        return self.factors[0].levels
+
+    @property
+    def questions(self) -> int:
+        """How many a participant is asked: every pair of conditions once in each cell."""
+        count = len(self.techniques)
+        return len(self.cells) * count * (count - 1) // 2
+
+    def factor(self, name: str) -> Factor:
+        """A factor by its name; KeyError where the study has none such."""
+        return {factor.name: factor for factor in self.factors}[name]
+
+    def cell(self, name: str) -> Cell:
+        """A cell by its name; KeyError where the study has none such."""
+        return {cell.name: cell for cell in self.cells}[name]
+
+    def cell_label(self, cell: Cell) -> str:
+        """The labels of a cell's levels."""
+        labels = []
+        for factor in self.factors:
+            known = {level.name: level.label for level in factor.levels}
+            labels.append(known[cell.levels[factor.name]])
+        return ", ".join(labels)
+
+    def scene_of(self, cell: Cell) -> dict:
+        """The scene's table with the patches of a cell's levels, in the order of the factors."""
+        table = dict(self.scene or {})
+        for factor in self.factors:
+            patch = next(v.patch for v in factor.levels if v.name == cell.levels[factor.name])
+            table = merge(table, patch)
+        return table
 
     def record(self) -> dict:
         """What the manifest says of the study; `read_study` reads it back."""
+
+        def named(level: Level) -> dict:
+            return {"name": level.name, "label": level.label}
+
+        more = [
+            {"name": f.name, "label": f.label, "levels": [named(level) for level in f.levels]}
+            for f in self.factors[1:]
+        ]
+        listed = len(self.cells) < prod(len(f.levels) for f in self.factors)
         return {
             "name": self.name,
             "title": self.title,
             "version": self.version,
             "seed": self.seed,
-            "framings": [{"name": f.name, "label": f.label} for f in self.framings],
+            "framings": [named(level) for level in self.framings],
+            **({"factors": more} if more else {}),
+            **({"cells": [cell.levels for cell in self.cells]} if listed else {}),
             "techniques": [{"name": t.name, "label": t.label} for t in self.techniques],
             "question": vars(self.question),
             "scale": [vars(level) for level in self.scale],
@@ -130,12 +240,13 @@ class Study:
 def load_study(path: str | Path) -> Study:
     """Read and validate a study's TOML file; InputError names the line or the dotted key at fault.
 
-    A head that is a file is looked for beside the study.
+    A scene or a scan that is a file is looked for beside the study.
     """
     path = Path(path)
     table = Table(_read_toml(path), str(path))
     render, head = table.table("render", default={}), table.table("head", default={})
     width, height = _size(render)
+    scene = load_table(table.text("scene", default="thesis"), path.parent)
     study = read_study(
         table,
         render=Render(
@@ -143,43 +254,148 @@ def load_study(path: str | Path) -> Study:
             render.number("supersample", 1, 4, default=2),
             render.number("seed", 0, 2**63 - 1, default=0),
         ),
-        head=_head(head, path.parent),
+        scene=with_head(scene, **_head(head, path.parent)),
     )
     for part in (table, render, head):
         part.end()
     return study
 
 
-def read_study(table: Table, render: Render | None = None, head: HeadChoice | None = None) -> Study:
+def with_head(scene: dict, name: str, unit: str | None = None, up: str | None = None) -> dict:
+    """The scene with another head: "default" for its own, a person by name, or a scan's file."""
+    if name == DEFAULT_HEAD:
+        return scene
+    subject = scene.get("subject", next(iter(scene.get("objects", {"head": {}}))))
+    own = scene.get("objects", {}).get(subject, {})
+    place = {key: own[key] for key in ("position_mm", "rotation_deg", "scale") if key in own}
+    if Path(name).suffix:
+        found = {"unit": unit, "up": up}
+        shape = {"shape": "scan", "file": name, **{k: v for k, v in found.items() if v}}
+    else:
+        shape = {"shape": "person", "person": name}
+    objects = {**scene.get("objects", {}), subject: {**place, **shape}}
+    return {**scene, "objects": objects}
+
+
+def read_study(table: Table, render: Render | None = None, scene: dict | None = None) -> Study:
     """The study in a table of a TOML file or of a manifest; without `render`, images are
     ready-made.
     """
-    asked = Table({**_thesis_asks(), **table.value}, table.source, table.key)
-    framings = table.tables("framings", least=1)
+    default = _defaults() if render is not None else {**_defaults(), "consent": CONSENT}
+    wording = Table({**default, **table.value}, table.source, table.key)
     techniques = table.tables("techniques", least=2)
+    factors = _factors(table, rendered=render is not None)
     study = Study(
         name=table.name("name"),
         title=table.text("title"),
         version=table.number("version", 1, 2**31 - 1),
         seed=table.number("seed", 0, 2**63 - 1),
-        framings=tuple(Framing(t.name("name"), t.text("label")) for t in framings),
+        factors=factors,
+        cells=_cells(table, factors),
         techniques=tuple(_condition(t, rendered=render is not None) for t in techniques),
-        question=_question(asked.table("question")),
-        scale=_scale(asked),
-        familiarity=_familiarity(asked.table("familiarity")),
-        consent=asked.text("consent"),
+        question=_question(wording.table("question")),
+        scale=_scale(wording),
+        familiarity=_familiarity(wording.table("familiarity")),
+        consent=_consent(wording),
         render=render,
-        head=head,
+        scene=scene,
         analysis=_analysis(table.table("analysis", default={})),
     )
-    for group in (framings, techniques):
-        refuse_doubles(group, "name")
-        refuse_doubles(group, "label")
-        for part in group:
-            part.end()
-    for key in _ASKED:
+    refuse_doubles(techniques, "name")
+    refuse_doubles(techniques, "label")
+    for part in techniques:
+        part.end()
+    for key in _WORDING:
         table.take(key, object, default=None, expected="anything")
     return study
+
+
+def _factors(table: Table, rendered: bool) -> tuple[Factor, ...]:
+    """framing, from [[framings]], and those of [[factors]]."""
+    framings = [Table(f, table.source, f"{table.at('framings')}[0]") for f in (HEAD_SHOT,)]
+    if "framings" in table.value:
+        framings = table.tables("framings", least=1)
+    found = [Factor(FRAMING, "Framing", _levels(framings, FRAMING, rendered))]
+    entries = table.tables("factors", least=0) if "factors" in table.value else []
+    for entry in entries:
+        name = entry.name("name")
+        if name in RESERVED:
+            raise entry.fault("name", name, f"another name than {', '.join(sorted(RESERVED))}")
+        levels = entry.tables("levels", least=1)
+        found.append(Factor(name, entry.text("label"), _levels(levels, name, rendered)))
+        entry.end()
+    refuse_doubles(entries, "name")
+    return tuple(found)
+
+
+def _levels(tables: list[Table], factor: str, rendered: bool) -> tuple[Level, ...]:
+    levels = []
+    for table in tables:
+        name, patch = table.name("name"), {}
+        if rendered:
+            patch = table.take("set", dict, "a table that is merged onto the scene's", default=None)
+            patch = _shorthand(table, factor, name) if patch is None else patch
+            region = table.take("region", list, "[left, top, right, bottom]", default=None)
+            if region is not None:
+                patch = merge(patch, {"camera": {"region": region}})
+        levels.append(Level(name, table.text("label"), patch))
+        table.end()
+    refuse_doubles(tables, "name")
+    refuse_doubles(tables, "label")
+    return tuple(levels)
+
+
+def _shorthand(table: Table, factor: str, name: str) -> dict:
+    """What a level without `set` changes: the value of its factor is its name."""
+    if factor not in SHORTHANDS:
+        raise InputError(
+            f"{table.source}: {table.at('set')}: missing, expected a table that is merged onto "
+            f"the scene's (only {', '.join(SHORTHANDS)} go without)"
+        )
+    value: object = name
+    for key in reversed(SHORTHANDS[factor]):
+        value = {key: value}
+    return value
+
+
+def _cells(table: Table, factors: tuple[Factor, ...]) -> tuple[Cell, ...]:
+    """All combinations of the factors' levels, or those that `cells` lists."""
+    cells = _crossed_or_listed(table, factors)
+    for cell in cells:
+        if len(cell.name) > LONGEST_CELL:
+            raise InputError(
+                f"{table.source}: {table.at('factors')}: the levels {cell.name} have "
+                f"{len(cell.name)} letters together, expected {LONGEST_CELL} at most"
+            )
+    return cells
+
+
+def _crossed_or_listed(table: Table, factors: tuple[Factor, ...]) -> tuple[Cell, ...]:
+    names = [factor.name for factor in factors]
+    if "cells" not in table.value:
+        every = product(*((level.name for level in factor.levels) for factor in factors))
+        return tuple(Cell(dict(zip(names, levels, strict=True))) for levels in every)
+    cells = []
+    for entry in table.tables("cells", least=1):
+        levels = {}
+        for factor in factors:
+            known = [level.name for level in factor.levels]
+            default = {"default": known[0]} if len(known) == 1 else {}
+            levels[factor.name] = entry.one_of(factor.name, known, **default)
+        entry.end()
+        if any(cell.levels == levels for cell in cells):
+            raise InputError(f"{entry.source}: {entry.key}: the same levels a second time")
+        cells.append(Cell(levels))
+    return tuple(cells)
+
+
+def _consent(table: Table) -> str:
+    text = table.text("consent")
+    for word in re.findall(r"\{([^{}]*)\}", text):
+        if word not in PLACEHOLDERS:
+            known = ", ".join(f"{{{name}}}" for name in PLACEHOLDERS)
+            raise table.fault("consent", f"{{{word}}}", f"one of {known}")
+    return text
 
 
 def _read_toml(path: Path) -> dict:
@@ -195,9 +411,10 @@ def _read_toml(path: Path) -> dict:
 
 
 @cache
-def _thesis_asks() -> dict:
+def _defaults() -> dict:
+    """The thesis's wording."""
     thesis = _read_toml(THESIS)
-    return {key: thesis[key] for key in _ASKED}
+    return {key: thesis[key] for key in _WORDING}
 
 
 def _condition(table: Table, rendered: bool) -> Condition:
@@ -218,11 +435,11 @@ def _question(table: Table) -> Question:
     return question
 
 
-def _scale(table: Table) -> tuple[Level, ...]:
+def _scale(table: Table) -> tuple[ScalePoint, ...]:
     levels = table.tables("scale", least=5, most=5)
     for expected, level in zip(range(-2, 3), levels):
         level.number("value", expected, expected)
-    scale = tuple(Level(level.value["value"], level.text("label")) for level in levels)
+    scale = tuple(ScalePoint(level.value["value"], level.text("label")) for level in levels)
     refuse_doubles(levels, "label")
     for level in levels:
         level.end()
@@ -298,9 +515,9 @@ def _size(table: Table) -> tuple[int, int]:
     )
 
 
-def _head(table: Table, beside: Path) -> HeadChoice:
-    name = table.text("name", default="default")
+def _head(table: Table, beside: Path) -> dict:
+    """[head] of a study: its name, unit and upward axis, for `with_head`."""
+    name = table.text("name", default=DEFAULT_HEAD)
     file = str(beside / name) if Path(name).suffix else name
-    return HeadChoice(
-        file, table.one_of("unit", UNITS, default=None), table.one_of("up", AXES, default=None)
-    )
+    units, axes = table.one_of("unit", UNITS, default=None), table.one_of("up", AXES, default=None)
+    return {"name": file, "unit": units, "up": axes}

@@ -71,7 +71,7 @@ def test_imports(path):
         allowed = (
             allowed
             | {f"stimuli.{relative.stem}"}
-            | ({"renderer", "stimuli.heads"} if relative.stem == "render" else set())
+            | ({"renderer", "stimuli.scenes"} if relative.stem == "render" else set())
         )
         allowed |= (
             {"renderer.errors", "renderer.medium", "renderer.profiles"}
@@ -129,7 +129,7 @@ def test_profiles_never_import_opengl():
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL and OSMesa are Linux's")
 def test_renderer_needs_no_x_server():
     """pyrender's viewer, which is imported with it, must not look for the libraries of a screen."""
-    program = "import sys, renderer.scene; print(*sys.modules)"
+    program = "import sys, renderer.scene.graph; print(*sys.modules)"
     run = subprocess.run(
         [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
     )

@@ -17,8 +17,8 @@ import click
 @click.option(
     "--head",
     help=(
-        'Head to show instead of the one that STUDY names: "default", or a scan, FILE.glb '
-        "or FILE.obj."
+        'Head to show instead of the scene\'s: "default" for its own, a person by name, or a scan, '
+        "FILE.glb or FILE.obj."
     ),
 )
 @click.option(
@@ -60,11 +60,12 @@ def command(
     stopped.
     """
     from stimuli.build import build
-    from stimuli.study import load_study
+    from stimuli.study import load_study, with_head
 
     definition = load_study(study)
-    given = {key: value for key, value in (("name", head), ("unit", unit), ("up", up)) if value}
-    definition = replace(definition, head=replace(definition.head, **given))
+    if head:
+        scene = with_head(definition.scene, head, unit, up)
+        definition = replace(definition, scene=scene)
     built = build(definition, out, force=force, progress=True, rounds=rounds)
     for note in built.notes:
         click.echo(note, err=True)

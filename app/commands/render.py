@@ -29,6 +29,29 @@ def _parameter(_context, _parameter, values: tuple[str, ...]) -> dict:
     return chosen
 
 
+def _patch(_context, _parameter, values: tuple[str, ...]) -> dict:
+    """--set a.b=1 --set c=text as {"a": {"b": 1}, "c": "text"}."""
+    import json
+
+    patch: dict = {}
+    for item in values:
+        keys, equals, text = item.partition("=")
+        if not equals or not all(keys.split(".")):
+            raise click.BadParameter(f"got {item!r}; expected KEY=VALUE, such as rig=noon")
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text
+        *parents, last = keys.split(".")
+        holder = patch
+        for key in parents:
+            holder = holder.setdefault(key, {})
+            if not isinstance(holder, dict):
+                raise click.BadParameter(f"got {item!r} after a value for {key}; expected one")
+        holder[last] = value
+    return patch
+
+
 def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     from renderer.errors import InputError
 
@@ -48,9 +71,7 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
 @click.option(
     "--framing",
     "-f",
-    default="close-up",
-    show_default=True,
-    help="close-up, head-shot or half-length.",
+    help="close-up, head-shot or half-length; the scene's own camera without it.",
 )
 @click.option(
     "--size",
@@ -78,10 +99,27 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     help="A parameter of the technique, value in JSON; repeat for more.",
 )
 @click.option(
+    "--scene",
+    default="thesis",
+    show_default=True,
+    help="The scene: a name of stimuli/scenes, or a TOML file.",
+)
+@click.option(
+    "--set",
+    "patches",
+    multiple=True,
+    metavar="KEY=VALUE",
+    callback=_patch,
+    help=(
+        "A value over the scene's, by its dotted key, in JSON or as text: rig=noon, "
+        "camera.yaw_deg=0, lights.rim=false; repeat for more."
+    ),
+)
+@click.option(
     "--head",
     default="default",
     show_default=True,
-    help="The default head, or a scan as .glb, .gltf or .obj.",
+    help="The scene's own head, a person by name, or a scan as .glb, .gltf or .obj.",
 )
 @click.option(
     "--unit",
@@ -111,7 +149,7 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     "--samples",
     type=click.Path(dir_okay=False, path_type=Path),
     help=(
-        "Also write the samples of each pixel, .npy, uint8 at the resolution at which "
+        "Also write the samples of each pixel, .npy, uint16 at the resolution at which "
         "scattering is computed; 0 where nothing scatters."
     ),
 )
@@ -121,9 +159,22 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     help="Also write the local contrast as a grey PNG (golubev_plus).",
 )
 def command(
-    technique, framing, size, out, parameters, head, unit, up, supersample, seed, samples, contrast
+    technique,
+    framing,
+    size,
+    out,
+    parameters,
+    scene,
+    patches,
+    head,
+    unit,
+    up,
+    supersample,
+    seed,
+    samples,
+    contrast,
 ):
-    """Render one technique at one framing.
+    """Render one technique in one scene.
 
     Prints where the image went and the mean number of samples over the pixels that scatter.
     """
@@ -132,11 +183,17 @@ def command(
 
     import renderer
     from renderer.errors import InputError
-    from stimuli.heads import load_head
+    from stimuli.scenes import load_table, merge, read_scene, stage
+    from stimuli.study import with_head
 
     chosen = renderer.make(technique, parameters)
-    if framing not in renderer.FRAMINGS:
-        raise InputError(f"no framing {framing!r}; expected one of {', '.join(renderer.FRAMINGS)}")
+    table = merge(load_table(scene), patches)
+    if framing:
+        if framing not in renderer.FRAMINGS:
+            known = ", ".join(renderer.FRAMINGS)
+            raise InputError(f"no framing {framing!r}; expected one of {known}")
+        table = merge(table, {"camera": {"framing": framing}})
+    definition = read_scene(with_head(table, head, unit, up))
     _writable(out, (".png",))
     if samples:
         _writable(samples, (".npy",))
@@ -146,25 +203,25 @@ def command(
             raise InputError(
                 f"{technique} measures no contrast; expected golubev_plus with --contrast"
             )
-    loaded = load_head(head, unit, seed, up)
-    for note in loaded.notes:
+    staged = stage(definition, seed)
+    for note in staged.notes:
         click.echo(note, err=True)
-    with renderer.Renderer(loaded.model, size=size, supersample=supersample, seed=seed) as drawing:
-        result = drawing.frame(framing).render(chosen)
+    with (
+        renderer.Renderer(staged.graph, size=size, supersample=supersample, seed=seed) as drawing,
+        drawing.frame() as frame,
+    ):
+        result = frame.render(chosen)
     Image.fromarray(result.image).save(out)
     if samples:
         np.save(samples, result.samples)
     if contrast:
-        Image.fromarray(np.rint(np.clip(result.contrast, 0, 1) * 255).astype(np.uint8)).save(
-            contrast
-        )
-    skin = result.samples[result.samples > 0]
-    mean = (
-        f"{skin.mean():.2f} samples a pixel over {skin.size} scattering pixels"
-        if skin.size
-        else "no scattering pixel is seen"
-    )
+        grey = np.rint(np.clip(result.contrast, 0, 1) * 255).astype(np.uint8)
+        Image.fromarray(grey).save(contrast)
+    taken = result.samples[result.samples > 0]
+    mean = "no scattering pixel is seen"
+    if taken.size:
+        mean = f"{taken.mean():.2f} samples a pixel over {taken.size} scattering pixels"
     click.echo(
-        f"{out}: {technique}, {framing}, {size[0]}x{size[1]}; {mean} at "
+        f"{out}: {technique}, {definition.camera.framing}, {size[0]}x{size[1]}; {mean} at "
         f"{supersample}x{supersample} supersampling"
     )

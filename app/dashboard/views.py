@@ -66,7 +66,7 @@ def index():
     return render_template(
         "dashboard/index.html",
         images=study().manifest.images,
-        framing_labels={framing.name: framing.label for framing in study().asked.framings},
+        cell_labels={cell.name: study().asked.cell_label(cell) for cell in study().asked.cells},
         technique_labels={
             condition.name: condition.label for condition in study().asked.techniques
         },
@@ -97,7 +97,7 @@ def responses_csv():
 
 @blueprint.get("/codebook.csv")
 def codebook_csv():
-    return _download(export.codebook_csv(), "codebook.csv")
+    return _download(export.codebook_csv(study()), "codebook.csv")
 
 
 @blueprint.get("/codebook.md")

@@ -131,8 +131,8 @@ def answer(
         )
     ).one()
     images = (
-        study.image(trial.framing, trial.left).sha256,
-        study.image(trial.framing, trial.right).sha256,
+        study.image(trial.cell, trial.left).sha256,
+        study.image(trial.cell, trial.right).sha256,
     )
     if (
         trial is not current(session, participant)

@@ -44,7 +44,7 @@ def welcome():
                     return render_template("questionnaire/simulated.html")
                 session["visit"] = secrets.token_urlsafe(16)
                 session.permanent = True
-            return render_template("questionnaire/consent.html", questions=_number_of_questions())
+            return render_template("questionnaire/consent.html", paragraphs=study().consent)
         place = _place(db, participant)
         if place in ("questionnaire.thanks", "questionnaire.withdrawn"):
             return redirect(url_for(place))
@@ -101,7 +101,7 @@ def question():
             "questionnaire/question.html",
             participant=participant,
             trial=trial,
-            framing=study().framings.index(trial.framing),
+            framing=study().framings.index(study().asked.cell(trial.cell).framing),
             images=_images(trial),
             upcoming=_images(flow.following(db, trial)),
             **_progress(db, participant),
@@ -227,16 +227,9 @@ def _progress(db: Session, participant: Participant) -> dict[str, int]:
     return {"answered": flow.count_answers(db, participant), "questions": len(participant.trials)}
 
 
-def _number_of_questions() -> int:
-    pairs = len(study().techniques) * (len(study().techniques) - 1) // 2
-    return len(study().framings) * pairs
-
-
 def _images(trial: Trial | None):
     """The left and right image of a trial; nothing after the last one."""
-    return (
-        [study().image(trial.framing, side) for side in (trial.left, trial.right)] if trial else []
-    )
+    return [study().image(trial.cell, side) for side in (trial.left, trial.right)] if trial else []
 
 
 def _integer(name: str, low: int, high: int) -> int | None:

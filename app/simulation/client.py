@@ -117,8 +117,8 @@ class Visitor:
             order = self._answered(number)
             while form := _find(page, "trial"):
                 order += 1
-                framing, left, right = self._seen(form)
-                answer, rt_ms = self._crowd.answer(number, order, framing, left, right)
+                cell, left, right = self._seen(form)
+                answer, rt_ms = self._crowd.answer(number, order, cell, left, right)
                 page = self._send(http, page, "trial", answer=answer, rt_ms=rt_ms, **WINDOW)
                 yield order
             if 'id="completion-code"' not in page.text:
@@ -130,7 +130,7 @@ class Visitor:
         )
 
     def _seen(self, form: Form) -> tuple[str, str, str]:
-        """Framing, left and right technique.
+        """Cell, left and right technique.
 
         The page names neither (people must not know): the hashes tell.
         """
@@ -138,7 +138,7 @@ class Visitor:
             self._study.images_by_sha256[form.fields[name]]
             for name in ("image_left", "image_right")
         )
-        return left.framing, left.technique, right.technique
+        return left.cell, left.technique, right.technique
 
     def _get(self, http: httpx.Client, path: str) -> httpx.Response:
         return _checked(http.get(urljoin(self._base, path)))

@@ -17,6 +17,7 @@ import math
 from random import Random
 
 from app.study import Study
+from stimuli.study import Cell
 
 #: Published priorities (Vuletic, tables 5.2 to 5.4).
 PUBLISHED_PRIORITIES = {
@@ -51,6 +52,8 @@ RELUCTANCE_STEP = (
 )
 #: Spread of the worths of a technique or framing that the thesis did not have, drawn from the seed.
 UNKNOWN_SPREAD = 0.4
+#: Spread that each combination of further levels (person, light, ...) adds.
+LEVEL_SPREAD = 0.15
 FAMILIARITY_SHARES = (0.15, 0.25, 0.3, 0.2, 0.1)
 MEDIAN_RT_MS, RT_SPREAD = 6500, 0.5  # log-normal
 
@@ -62,36 +65,41 @@ class Crowd:
 
     def __init__(self, study: Study, seed: int):
         self._seed = seed
-        self._worths = {framing: self._framing_worths(study, framing) for framing in study.framings}
-        self._reluctance = {
-            framing: 1 + RELUCTANCE_STEP * place for place, framing in enumerate(study.framings)
-        }
+        place = {framing: k for k, framing in enumerate(study.framings)}
+        self._worths, self._reluctance = {}, {}
+        for cell in study.asked.cells:
+            self._worths[cell.name] = self._cell_worths(study, cell)
+            self._reluctance[cell.name] = 1 + RELUCTANCE_STEP * place[cell.framing]
 
     def familiarity(self, participant: int) -> int:
         """1 to 5."""
         return self._random(participant, "familiarity").choices(range(1, 6), FAMILIARITY_SHARES)[0]
 
     def answer(
-        self, participant: int, order: int, framing: str, left: str, right: str
+        self, participant: int, order: int, cell: str, left: str, right: str
     ) -> tuple[int, int]:
         """The answer, -2 to 2 (negative: left), and the time it took, ms."""
         random = self._random(participant, order)
-        worths, reluctance = self._worths[framing], self._reluctance[framing]
+        worths, reluctance = self._worths[cell], self._reluctance[cell]
         d = GAIN * (worths[right] - worths[left]) + SIDE_BIAS + random.gauss(0, NOISE)
         strength = (abs(d) > SLIGHT * reluctance) + (abs(d) > CLEAR * reluctance)
         rt_ms = round(MEDIAN_RT_MS * math.exp(random.gauss(0, RT_SPREAD)))
         return int(math.copysign(strength, d)), rt_ms
 
-    def _framing_worths(self, study: Study, framing: str) -> dict[str, float]:
-        published = PUBLISHED_PRIORITIES.get(framing, {})
+    def _cell_worths(self, study: Study, cell: Cell) -> dict[str, float]:
+        """Those of the cell's framing, moved a little by its other levels."""
+        published = PUBLISHED_PRIORITIES.get(cell.framing, {})
         logs = {name: math.log(priority) for name, priority in published.items()}
         centre = sum(logs.values()) / len(logs) if logs else 0.0
-        return {
-            name: logs[name] - centre
-            if name in logs
-            else self._random(framing, name).gauss(0, UNKNOWN_SPREAD)
-            for name in study.techniques
-        }
+        worths = {}
+        for name in study.techniques:
+            if name in logs:
+                worths[name] = logs[name] - centre
+            else:
+                worths[name] = self._random(cell.framing, name).gauss(0, UNKNOWN_SPREAD)
+            if len(cell.levels) > 1:
+                worths[name] += self._random(cell.name, name).gauss(0, LEVEL_SPREAD)
+        return worths
 
     def _random(self, *key: object) -> Random:
         return Random(

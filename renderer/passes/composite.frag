@@ -1,8 +1,11 @@
 // Scattered irradiance to radiance, specular on top, hair over it, a studio backdrop behind; tone mapped, still linear.
 #include "shaders/common.glsl"
+#include "shaders/environment.glsl"
 in vec2 uv;
 uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albedo; uniform sampler2D depth_normal; uniform sampler2D hair;
 uniform float exposure;
+uniform int tone_map; uniform int backdrop;  // places in the lists of renderer/scene/picture.py
+uniform mat3 rays;                           // normalised device coordinates to directions in the world
 uniform vec3 backdrop_centre; uniform vec3 backdrop_edge;
 uniform float aspect;
 out vec4 colour;
@@ -10,15 +13,26 @@ out vec4 colour;
 // Narkowicz 2016, "ACES filmic tone mapping curve".
 vec3 filmic(vec3 x) { return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14); }
 
+// Hable 2010, "Uncharted 2: HDR lighting": white at 11.2.
+vec3 hable_curve(vec3 x) { return (x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.50) + 0.06) - 0.02 / 0.30; }
+vec3 hable(vec3 x) { return hable_curve(2.0 * x) / hable_curve(vec3(11.2)); }
+
+vec3 toned(vec3 x) { return tone_map == 0 ? filmic(x) : tone_map == 1 ? hable(x) : x; }
+
+vec3 behind() {
+    vec2 d = (uv - vec2(0.5, 0.52)) * vec2(aspect, 1.0);
+    if (backdrop == 0) return mix(backdrop_centre, backdrop_edge, smoothstep(0.0, 1.0, length(d)));
+    return environment(normalize(rays * vec3(uv * 2.0 - 1.0, 1.0)), 4096.0);
+}
+
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(depth_normal, at, 0).x;
-    vec2 d = (uv - vec2(0.5, 0.52)) * vec2(aspect, 1.0);
-    vec3 radiance = mix(backdrop_centre, backdrop_edge, smoothstep(0.0, 1.0, length(d)));
+    vec3 radiance = behind();
     if (depth > 0.0) {
         radiance = texelFetch(albedo, at, 0).rgb * texelFetch(scattered, at, 0).rgb / PI + texelFetch(specular, at, 0).rgb;
     }
     vec4 strands = texelFetch(hair, at, 0);
     radiance = radiance * (1.0 - strands.a) + strands.rgb;
-    colour = vec4(clamp(filmic(exposure * radiance), 0.0, 1.0), 1.0);
+    colour = vec4(clamp(toned(exposure * radiance), 0.0, 1.0), 1.0);
 }

@@ -54,19 +54,19 @@ void main() {
     vec3 specular = vec3(0.0);
     float f0 = 0.025;
     vec3 flat_n = gaze;
-    for (int k = 0; k < LAMPS; ++k) {
-        vec3 l = lamp_direction[k];
+    for (int k = 0; k < lamps; ++k) {
+        vec3 l = lamp_towards(k, world), light_here = lamp_light(k, world);
         float seen = visibility(k, world, n, phase);
         // the iris is lit through the cornea: flat, and brighter opposite the lamp (a cheap caustic)
         vec2 across = vec2(dot(l, side), dot(l, up));
         float focus = 1.0 + 0.9 * clamp(-dot(iris, across), -0.5, 1.0);
         float on_iris = max(dot(flat_n, l), 0.0) * focus, on_white = smoothstep(-0.25, 1.0, dot(n, l));
-        irradiance += lamp_irradiance[k] * seen * mix(on_iris, on_white, limbus);
-        specular += lamp_irradiance[k] * seen * max(dot(n, l), 0.0) * min(kelemen(n, v, l, 0.045, f0), 40.0);
+        irradiance += light_here * seen * mix(on_iris, on_white, limbus);
+        specular += light_here * seen * max(dot(n, l), 0.0) * min(kelemen(n, v, l, 0.045, f0), 40.0);
     }
     vec3 r_dir = reflect(-v, n);
     float nv = max(dot(n, v), 0.02);
-    specular += panels(r_dir, 400.0) * schlick(f0, nv) * smoothstep(0.05, 0.45, open_sky);
+    specular += environment(r_dir, 400.0) * schlick(f0, nv) * smoothstep(0.05, 0.45, open_sky);
     // the tear film thickens where the lids meet the eye
     float lid = smoothstep(0.62, 0.15, open_sky);
     specular *= 1.0 - 0.6 * lid;
@@ -74,6 +74,6 @@ void main() {
     out_irradiance = vec4(irradiance, 0.0);
     out_specular = vec4(specular, 1.0);
     out_albedo = vec4(albedo, 1.0);
-    out_depth_normal = vec4(view_depth, mat3(view) * n);
+    put_place(n);
     out_transmitted = vec4(0.0);
 }

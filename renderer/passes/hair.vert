@@ -10,7 +10,7 @@ uniform mat4 projection;
 uniform vec3 camera_position;
 uniform float pixels_per_mm;   // at 1 mm
 uniform float minimum_px;
-out vec3 world; out vec3 tangent; out vec3 albedo; out vec3 environment; out vec3 root_normal; out float cover; out float opacity; out float side;
+out vec3 world; out vec3 tangent; out vec3 albedo; out vec3 around; out vec3 root_normal; out float cover; out float opacity; out float side;
 void main() {
     vec3 to_eye = normalize(camera_position - position);
     vec3 across = cross(tangent_in, to_eye);
@@ -22,6 +22,6 @@ void main() {
     opacity = min(pixels / minimum_px, 1.0);
     world = position + across * strand.x * 0.5 * wide;
     side = strand.x;
-    tangent = tangent_in; albedo = albedo_in; environment = environment_in; root_normal = normal_in; cover = strand.z;
+    tangent = tangent_in; albedo = albedo_in; around = environment_in; root_normal = normal_in; cover = strand.z;
     gl_Position = projection * view * vec4(world, 1.0);
 }

@@ -1,3 +1,4 @@
+// Depth along the layer's axis; interpolated in the world, so that cones keep it linear.
 in float depth_mm;
-layout(location = 0) out float linear_depth;
-void main() { linear_depth = depth_mm; }
+uniform float depth_range;
+void main() { gl_FragDepth = depth_mm / depth_range; }

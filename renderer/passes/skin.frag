@@ -7,7 +7,16 @@ uniform vec3 eye_l; uniform vec3 eye_r; uniform vec3 mouth; uniform vec3 nose;
 uniform int procedural;
 uniform int has_albedo_map; uniform int has_normal_map; uniform int has_roughness_map;
 uniform sampler2D albedo_map; uniform sampler2D normal_map; uniform sampler2D roughness_map;
-uniform vec3 base_colour;
+uniform vec3 albedo_colour;
+uniform float roughness; uniform float f0; uniform float specular_strength;
+uniform vec2 lobe_roughness; uniform float lobe_share;
+uniform float melanin; uniform float blood; uniform float flush; uniform float mottling;
+uniform vec3 melanin_absorbance; uniform vec3 blood_absorbance; uniform vec3 dermis; uniform vec3 lip;
+uniform float freckles; uniform float freckle_share; uniform float moles; uniform float mole_share;
+uniform float beard_tint; uniform float scalp_tint;
+uniform float pore_depth; uniform float furrow_depth; uniform float bump_height; uniform float wrinkle_depth; uniform float lip_folds;
+uniform float roughness_dry; uniform float roughness_oily;
+uniform float material_id;           // 1, 2, ...: which medium scatters below; 0: none
 uniform vec3 noise_origin;           // mm: the seed's place in the solid noise
 uniform float gaussian_falloff[6];   // 1 / (2 variance), 1/mm^2
 uniform vec3 gaussian_weight[6];
@@ -29,7 +38,7 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
         float size = k == 0 ? 0.95 : 0.60;
         Cells c = cells(q / size);
         float own = 0.35 + 0.65 * unit(mix_bits(c.id ^ 0x51u));
-        float depth = (k == 0 ? 0.042 : 0.022) * pores * own * skin * fade(size * 0.6, pixel_mm);
+        float depth = pore_depth * (k == 0 ? 0.042 : 0.022) * pores * own * skin * fade(size * 0.6, pixel_mm);
         float w = k == 0 ? 0.30 : 0.28;
         float e = exp(-c.f1 * c.f1 / (w * w));
         h.x -= depth * e;
@@ -40,7 +49,7 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
             Cells g = cells(q / 0.72 + 31.7);
             float gap = g.f2 - g.f1, wide = 0.16;
             float f = exp(-gap * gap / (wide * wide));
-            float deep = 0.015 * skin * (1.0 - 0.7 * pores) * fade(0.5, pixel_mm);
+            float deep = furrow_depth * 0.015 * skin * (1.0 - 0.7 * pores) * fade(0.5, pixel_mm);
             vec3 d = g.d2 / max(g.f2, 1e-3) - g.d1 / max(g.f1, 1e-3);
             h.x -= deep * f;
             h.yzw += deep * f * 2.0 * gap / (wide * wide) * d / 0.72;
@@ -49,7 +58,7 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
     // bumps of 1.6, 4 and 11 mm
     vec4 n1 = value_noise(q / 1.6), n2 = value_noise(q / 4.1 + 7.0), n3 = value_noise(q / 11.0 + 3.0);
     float t1 = 0.022 * skin * fade(1.0, pixel_mm), t2 = 0.045 * skin, t3 = 0.16 * (1.0 - inside) * (1.0 - 0.6 * lips);
-    h += t1 * vec4(n1.x, n1.yzw / 1.6) + t2 * vec4(n2.x, n2.yzw / 4.1) + t3 * vec4(n3.x, n3.yzw / 11.0);
+    h += bump_height * (t1 * vec4(n1.x, n1.yzw / 1.6) + t2 * vec4(n2.x, n2.yzw / 4.1) + t3 * vec4(n3.x, n3.yzw / 11.0));
 
     // forehead: three faint lines that wander
     vec3 eyes = 0.5 * (eye_l + eye_r);
@@ -60,7 +69,7 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
         float y = f.y + 3.0 * warp.x;
         float period = 10.5, phase = fract(y / period) - 0.5, s = phase * period;
         float strength = 0.5 + 0.5 * noise(vec3(q.x / 16.0, floor(y / period) * 3.1, 5.0));
-        float w = 0.9, g = exp(-s * s / (w * w)) * 0.045 * strength * brow;
+        float w = 0.9, g = exp(-s * s / (w * w)) * wrinkle_depth * 0.045 * strength * brow;
         h.x -= g;
         h.z += g * 2.0 * s / (w * w);
     }
@@ -71,20 +80,20 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
         vec2 d = vec2(side * (p.x - eye.x) - 17.0, p.y - eye.y + 1.0);
         float r = length(d), angle = atan(d.y, d.x);
         float feet = smoothstep(2.0, 7.0, r) * (1.0 - smoothstep(12.0, 22.0, r)) * (1.0 - smoothstep(0.6, 1.1, abs(angle)));
-        if (feet > 0.0 && p.z > 60.0) {
+        if (feet > 0.0 && p.z > eye.z - 67.5) {
             float s = angle * 5.5 + 0.9 * noise(q / 5.0);
-            float g = pow(0.5 + 0.5 * cos(s * 2.0 * PI / 1.6), 6.0) * 0.035 * feet;
+            float g = pow(0.5 + 0.5 * cos(s * 2.0 * PI / 1.6), 6.0) * wrinkle_depth * 0.035 * feet;
             h.x -= g;
-            float slope = 0.035 * feet * 6.0 * pow(0.5 + 0.5 * cos(s * 2.0 * PI / 1.6), 5.0) * 0.5 * sin(s * 2.0 * PI / 1.6) * 2.0 * PI / 1.6 * 5.5 / max(r, 2.0);
+            float slope = wrinkle_depth * 0.035 * feet * 6.0 * pow(0.5 + 0.5 * cos(s * 2.0 * PI / 1.6), 5.0) * 0.5 * sin(s * 2.0 * PI / 1.6) * 2.0 * PI / 1.6 * 5.5 / max(r, 2.0);
             h.yz += slope * vec2(-sin(angle) * side, cos(angle));
         }
         vec2 e = vec2(p.x - eye.x, p.y - eye.y);
         float bag = smoothstep(-20.0, -13.0, e.y) * (1.0 - smoothstep(-9.5, -7.5, e.y)) * (1.0 - smoothstep(12.0, 18.0, abs(e.x)));
-        if (bag > 0.0 && p.z > 60.0) {
+        if (bag > 0.0 && p.z > eye.z - 67.5) {
             float s = e.y + 0.012 * e.x * e.x + 1.2 * noise(q / vec3(9.0, 4.0, 9.0));
             float wave = 2.0 * PI / 2.3;
-            h.x += 0.02 * bag * cos(s * wave);
-            h.z -= 0.02 * bag * sin(s * wave) * wave * 0.5;
+            h.x += wrinkle_depth * 0.02 * bag * cos(s * wave);
+            h.z -= wrinkle_depth * 0.02 * bag * sin(s * wave) * wave * 0.5;
         }
     }
     // lips: vertical folds that fan out
@@ -92,40 +101,39 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
         vec2 d = vec2(p.x - mouth.x, (p.y - mouth.y) * 0.35);
         float s = d.x * (1.0 + 0.10 * noise(q / 6.0)) + 0.9 * noise(q / vec3(2.4, 7.0, 2.4));
         float wave = 2.0 * PI / 1.25;
-        float g = 0.5 + 0.5 * cos(s * wave), amp = 0.040 * lips * fade(1.0, pixel_mm) * (0.6 + 0.4 * noise(q / 3.0 + 9.0));
+        float g = 0.5 + 0.5 * cos(s * wave), amp = lip_folds * 0.040 * lips * fade(1.0, pixel_mm) * (0.6 + 0.4 * noise(q / 3.0 + 9.0));
         h.x -= amp * pow(g, 3.0);
         h.y += amp * 3.0 * g * g * 0.5 * sin(s * wave) * wave;
         Cells c = cells(q / 0.8 + 11.0);
-        h.yzw += 0.006 * fade(0.6, pixel_mm) * lips * c.d1;
+        h.yzw += lip_folds * 0.006 * fade(0.6, pixel_mm) * lips * c.d1;
     }
     return h;
 }
 
 // Skin colour: melanin and haemoglobin as absorbances over a pale dermis, one Beer-Lambert law per pigment.
 vec3 colour(vec3 p, float pixel_mm, float pore_shade) {
-    float lips = a.x, flush = a.y, hair = a.z, eyelid = a.w, oil = b.y, beard = b.z, inside = b.w;
+    float lips = a.x, flushed = a.y, hair = a.z, eyelid = a.w, beard = beard_tint * b.z, inside = b.w;
     vec3 q = p + noise_origin;
     float broad = fbm(q / 38.0), patchy = fbm(q / 9.0 + 4.0), fine = noise(q / 2.2 + 2.0) * fade(1.5, pixel_mm);
-    float melanin = 0.20 + 0.045 * broad + 0.040 * patchy + 0.018 * fine + 0.05 * eyelid + 0.060 * pore_shade;
-    float blood = 0.21 + 0.34 * flush + 0.075 * fbm(q / 15.0 + 21.0) + 0.045 * patchy * noise(q / 5.0 + 1.0) + 0.05 * eyelid;
+    float m = melanin + 0.045 * broad + 0.040 * patchy + 0.018 * fine + 0.05 * eyelid + 0.060 * pore_shade;
+    float h = blood + flush * flushed + 0.075 * fbm(q / 15.0 + 21.0) + 0.045 * patchy * noise(q / 5.0 + 1.0) + 0.05 * eyelid;
     // capillary mottling, strongest where the skin is flushed
-    blood += (0.05 + 0.13 * flush) * max(fbm(q / 3.2 + 40.0), 0.0) * fade(2.0, pixel_mm);
+    h += mottling * (0.05 + 0.13 * flushed) * max(fbm(q / 3.2 + 40.0), 0.0) * fade(2.0, pixel_mm);
     // freckles and a few moles
     Cells c = cells(q / 7.5);
-    float freckle = step(0.72, unit(mix_bits(c.id ^ 3u))) * smoothstep(0.13, 0.05, c.f1 + 0.03 * noise(q * 2.0));
-    melanin += 0.14 * freckle * (1.0 - lips);
-    Cells m = cells(q / 31.0 + 3.0);
-    float mole = step(0.80, unit(mix_bits(m.id ^ 7u))) * smoothstep(0.040, 0.024, m.f1 + 0.006 * noise(q * 1.7));
-    melanin += 0.65 * mole * (1.0 - lips);
+    float freckle = step(1.0 - freckle_share, unit(mix_bits(c.id ^ 3u))) * smoothstep(0.13, 0.05, c.f1 + 0.03 * noise(q * 2.0));
+    m += freckles * freckle * (1.0 - lips);
+    Cells spots = cells(q / 31.0 + 3.0);
+    float mole = step(1.0 - mole_share, unit(mix_bits(spots.id ^ 7u))) * smoothstep(0.040, 0.024, spots.f1 + 0.006 * noise(q * 1.7));
+    m += moles * mole * (1.0 - lips);
     // hair below the surface: scalp and shaven beard, dots that merge with distance
     Cells d = cells(q / 0.85 + 8.0);
     float dots = mix(0.22, smoothstep(0.34, 0.16, d.f1), fade(0.9, pixel_mm));
     float rooted = clamp(hair + 0.75 * beard, 0.0, 1.0) * (0.75 + 0.25 * noise(q / 4.0));
-    vec3 pale = vec3(0.770, 0.610, 0.520);
-    vec3 skin = pale * exp(-melanin * vec3(0.55, 1.15, 1.75) - blood * vec3(0.12, 1.05, 0.85));
-    vec3 lip = vec3(0.50, 0.215, 0.195) * (1.0 + 0.10 * fbm(q / 2.5) + 0.06 * noise(q / 0.9));
-    skin = mix(skin, lip, 0.88 * smoothstep(0.12, 0.85, lips + 0.10 * noise(q / 1.3)));
-    skin *= mix(vec3(1.0), vec3(0.42, 0.40, 0.40), hair * 0.9) * (1.0 - rooted * vec3(0.20, 0.18, 0.15) - 0.45 * dots * rooted);
+    vec3 skin = dermis * exp(-m * melanin_absorbance - h * blood_absorbance);
+    vec3 lip_colour = lip * (1.0 + 0.10 * fbm(q / 2.5) + 0.06 * noise(q / 0.9));
+    skin = mix(skin, lip_colour, 0.88 * smoothstep(0.12, 0.85, lips + 0.10 * noise(q / 1.3)));
+    skin *= mix(vec3(1.0), vec3(0.42, 0.40, 0.40), hair * scalp_tint) * (1.0 - rooted * vec3(0.20, 0.18, 0.15) - 0.45 * dots * rooted);
     skin = mix(skin, vec3(0.30, 0.07, 0.06), inside);
     return skin;
 }
@@ -133,31 +141,36 @@ vec3 colour(vec3 p, float pixel_mm, float pore_shade) {
 vec3 transmitted(int lamp, vec3 p, vec3 n) {
     // Jimenez et al. 2010, "Real-time realistic skin translucency", doi:10.1109/MCG.2010.39
     vec3 inner = p - n * 0.6;
-    vec3 q = to_lamp(lamp, inner);
+    if (lamp_layer[lamp] < 0) return vec3(0.0);
+    int layer = layer_of(lamp, inner);
+    vec3 q = to_layer(layer, inner);
+    float scale = scale_of(lamp, layer, q.z);
     vec3 total = vec3(0.0);
     for (int k = 0; k < 8; ++k) {
-        float z = lamp_depth(lamp, q.xy + lamp_scale(lamp) * 0.7 * vogel(k, 8, 0.0));
+        float z = layer_depth(layer, q.xy + scale * 0.7 * vogel(k, 8, 0.0));
         float thickness = max(q.z - z, 0.0) * thickness_scale;
         for (int j = 0; j < 6; ++j) total += gaussian_weight[j] * exp(-thickness * thickness * gaussian_falloff[j]);
     }
-    return total / 8.0 * clamp(transmission_wrap + dot(lamp_direction[lamp], -n), 0.0, 1.0) * lamp_irradiance[lamp];
+    return total / 8.0 * clamp(transmission_wrap + dot(lamp_towards(lamp, p), -n), 0.0, 1.0) * lamp_light(lamp, p);
 }
 
 void main() {
     vec3 smooth_n = normalize(world_normal);
     vec3 v = normalize(camera_position - world);
+#if DOMAIN == SCREEN
     if (dot(smooth_n, v) < 0.0 && !gl_FrontFacing) smooth_n = -smooth_n;
-    vec2 px = vec2(length(dFdx(world)), length(dFdy(world)));
-    float pixel_mm = max(min(px.x, px.y), 1e-3);
+#endif
+    float pixel_mm = footprint_mm();
     vec3 n = smooth_n;
-    vec3 albedo = base_colour;
-    float m = 0.36;
+    vec3 albedo = albedo_colour;
+    float m = roughness;
     float shade = 0.0;
     if (procedural == 1) {
-        vec4 h = relief(world, pixel_mm, shade);
-        n = normalize(smooth_n - (h.yzw - smooth_n * dot(h.yzw, smooth_n)));
-        albedo = colour(world, pixel_mm, shade);
-        m = mix(0.42, 0.27, b.y) - 0.08 * a.x + 0.03 * noise((world + noise_origin) / 3.0);
+        vec4 h = relief(local, pixel_mm, shade);
+        vec3 slope = mat3(model) * h.yzw / length(model[0].xyz);  // relief grows with its object
+        n = normalize(smooth_n - (slope - smooth_n * dot(slope, smooth_n)));
+        albedo = colour(local, pixel_mm, shade);
+        m = mix(roughness_dry, roughness_oily, b.y) - 0.08 * a.x + 0.03 * noise((local + noise_origin) / 3.0);
     } else {
         if (has_albedo_map == 1) albedo = from_srgb(texture(albedo_map, uv).rgb);
         if (has_roughness_map == 1) m = clamp(texture(roughness_map, uv).r, 0.12, 0.9);
@@ -173,19 +186,21 @@ void main() {
             }
         }
     }
+#if DOMAIN == SCREEN
     if (dot(n, v) < 0.02) n = normalize(n + v * (0.02 - dot(n, v)));
+#endif
 
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
     vec3 irradiance = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
     vec3 specular = vec3(0.0), through = vec3(0.0);
     float wet = a.x;
-    for (int k = 0; k < LAMPS; ++k) {
-        vec3 l = lamp_direction[k];
+    for (int k = 0; k < lamps; ++k) {
+        vec3 l = lamp_towards(k, world);
         float nl = dot(n, l), geometric = dot(smooth_n, l);
         if (geometric > -0.08 && nl > 0.0) {
-            vec3 e = lamp_irradiance[k] * nl * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
+            vec3 e = lamp_light(k, world) * nl * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
             irradiance += e;
-            float lobe = 0.75 * kelemen(n, v, l, m * 0.85, 0.028) + 0.25 * kelemen(n, v, l, min(m * 1.5, 0.9), 0.028);
+            float lobe = (1.0 - lobe_share) * kelemen(n, v, l, m * lobe_roughness.x, f0) + lobe_share * kelemen(n, v, l, min(m * lobe_roughness.y, 0.9), f0);
             specular += e * lobe * (1.0 - 0.5 * min(shade, 1.0)) * (1.0 - 0.85 * b.w);
         }
         through += transmitted(k, world, smooth_n);
@@ -195,14 +210,14 @@ void main() {
     float rough = m * 1.1;
     float nv = max(dot(n, v), 0.02);
     float occlusion = clamp(pow(nv + open_sky, exp2(-16.0 * rough - 1.0)) - 1.0 + open_sky, 0.0, 1.0);  // Lagarde and de Rousiers 2014
-    float f = 0.028 + 0.30 * pow(1.0 - nv, 5.0) * (1.0 - rough);
-    specular += panels(r, 2.0 / (rough * rough)) * f * (1.0 - 0.5 * min(shade, 1.0)) * occlusion * (1.0 - 0.9 * b.w);
+    float f = f0 + 0.30 * pow(1.0 - nv, 5.0) * (1.0 - rough);
+    specular += environment(r, 2.0 / (rough * rough)) * f * (1.0 - 0.5 * min(shade, 1.0)) * occlusion * (1.0 - 0.9 * b.w);
 
     vec3 dark = mix(vec3(1.0), vec3(0.35), b.w);
-    float mask = step(0.5, scatters);
+    float mask = material_id * step(0.5, scatters);
     out_irradiance = vec4(irradiance * dark, mask);
-    out_specular = vec4(specular, 1.0);
+    out_specular = vec4(specular_strength * specular, 1.0);
     out_albedo = vec4(albedo, 1.0);
-    out_depth_normal = vec4(view_depth, mat3(view) * n);
-    out_transmitted = vec4(through * (1.0 - b.w) * mask, 1.0);
+    put_place(n);
+    out_transmitted = vec4(mask > 0.0 ? through * (1.0 - b.w) : vec3(0.0), 1.0);
 }

@@ -1,9 +1,34 @@
-// What the shading of any surface hands to the rest of the frame.
-layout(location = 0) out vec4 out_irradiance;    // rgb: E, alpha: 1 where the material scatters
+// What the shading of any surface hands to the rest.
+#include "passes/domain.glsl"
+layout(location = 0) out vec4 out_irradiance;    // rgb: E, alpha: the id of the material that scatters, 0 for none
 layout(location = 1) out vec4 out_specular;      // rgb: radiance added after scattering
 layout(location = 2) out vec4 out_albedo;        // rgb: diffuse albedo
-layout(location = 3) out vec4 out_depth_normal;  // x: view depth in mm, yzw: normal in view space
+layout(location = 3) out vec4 out_depth_normal;  // screen: view depth in mm, normal in view space; else: normal in the world
 layout(location = 4) out vec4 out_transmitted;   // rgb: irradiance that comes through from behind
-in vec3 world; in vec3 world_normal; in vec2 uv; in vec4 a; in vec4 b; in mat3 light; in float open_sky; in float scatters;
+#if DOMAIN != SCREEN
+layout(location = 5) out vec4 out_position;      // xyz: mm in the world, alpha 1
+#endif
+in vec3 world; in vec3 local; in vec3 world_normal; in vec2 uv; in vec4 a; in vec4 b; in mat3 light; in float open_sky; in float scatters;
 in float view_depth;
+uniform mat4 model;
 uniform mat4 view;
+
+// Millimetres that a fragment covers: relief finer than that fades out.
+#if DOMAIN == POINTS
+uniform float point_mm;
+float footprint_mm() { return point_mm; }
+#else
+float footprint_mm() {
+    vec2 px = vec2(length(dFdx(world)), length(dFdy(world)));
+    return max(min(px.x, px.y), 1e-3);
+}
+#endif
+
+void put_place(vec3 n) {
+#if DOMAIN == SCREEN
+    out_depth_normal = vec4(view_depth, mat3(view) * n);
+#else
+    out_depth_normal = vec4(n, 1.0);
+    out_position = vec4(world, 1.0);
+#endif
+}

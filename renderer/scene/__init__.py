@@ -1,34 +1,37 @@
 """What is drawn: objects, materials, lights and the camera, as frozen values read from tables."""
 
-from renderer.scene.model import MASKS, Eye, Model, Proxy, Skin, Strands
-from renderer.scene.studio import (
-    FRAMINGS,
-    STUDIO,
-    Framing,
-    Lamp,
-    Lobe,
-    Studio,
-    View,
-    lamp_matrix,
-    look_at,
-    resolve,
+from renderer.scene.camera import ANGLES, FRAMINGS, Camera
+from renderer.scene.lights import (
+    DistantLight,
+    Environment,
+    Light,
+    Panel,
+    PointLight,
+    SpotLight,
 )
+from renderer.scene.material import Material, Skin
+from renderer.scene.model import MASKS, Eye, Model, Proxy, Strands, Surface
+from renderer.scene.picture import Picture
+from renderer.scene.scene import Scene
 
 __all__ = [
+    "ANGLES",
     "FRAMINGS",
     "MASKS",
-    "STUDIO",
+    "Camera",
+    "DistantLight",
+    "Environment",
     "Eye",
-    "Framing",
-    "Lamp",
-    "Lobe",
+    "Light",
+    "Material",
     "Model",
+    "Panel",
+    "Picture",
+    "PointLight",
     "Proxy",
+    "Scene",
     "Skin",
+    "SpotLight",
     "Strands",
-    "Studio",
-    "View",
-    "lamp_matrix",
-    "look_at",
-    "resolve",
+    "Surface",
 ]

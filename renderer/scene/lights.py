@@ -27,6 +27,13 @@ class Light(Parameters):
 
     irradiance: tuple[float, float, float] = parameter((1.0, 1.0, 1.0), **_COLOUR)
     shadow: bool = parameter(True, source="percentage-closer soft shadows, Fernando 2005")
+    search_mm: float = parameter(
+        28.0,
+        unit="mm in front of a point that are searched for what shades it",
+        low=0.1,
+        high=1e4,
+        source="a head's features, chosen by eye",
+    )
 
     def plain(self) -> dict[str, Any]:
         return {"kind": self.kind, **super().plain()}

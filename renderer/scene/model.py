@@ -5,13 +5,16 @@ Lengths are millimetres, y is up, the head looks along +z, the crown is at y = 0
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from renderer.scene import material
+from renderer.scene.material import Material
+
 
 @dataclass(frozen=True)
-class Skin:
+class Surface:
     """The scattering surface.
 
     positions, normals (N, 3) float32; uvs (N, 2); faces (M, 3). masks: (N, 8) in [0, 1], columns
@@ -48,6 +51,16 @@ class Proxy:
     albedo: np.ndarray
     to_full: object
 
+    @classmethod
+    def itself(cls, positions, normals, faces, albedo) -> Proxy:
+        """The surface as its own proxy; albedo (3,) or (N, 3)."""
+        from scipy import sparse
+
+        count = len(positions)
+        albedo = np.broadcast_to(np.asarray(albedo, float), (count, 3))
+        to_full = sparse.identity(count, format="csr")
+        return cls(np.asarray(positions, float), np.asarray(normals, float), faces, albedo, to_full)
+
 
 MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
 
@@ -70,7 +83,7 @@ class Eye:
 @dataclass(frozen=True)
 class Strands:
     """Hair as polylines: points (S, P, 3) mm; width_mm (S,); colour (S, 3) linear albedo; cover (S,
-    P) in [0, 1], the share of the hair layer above each point; root_vertex (S,) index into Skin.
+    P) in [0, 1], the share of the hair layer above each point; root_vertex (S,) index into Surface.
     """
 
     points: np.ndarray
@@ -87,8 +100,8 @@ class Model:
     landmarks: name -> (3,) mm, at least eyes, eye_l, eye_r, mouth, nose.
     """
 
-    skin: Skin
+    surface: Surface
     eyes: tuple[Eye, ...]
     strands: Strands | None
     landmarks: dict[str, np.ndarray]
-    procedural: bool = True  # skin colour and relief come from the shader, not from maps
+    material: Material = field(default_factory=material.Skin)

@@ -1,68 +1,89 @@
-// Lamps, panels, shadows and surface reflection shared by skin, eyes and hair.
+// Lamps of every kind, shadows, environment and surface reflection, shared by skin, eyes and hair.
 uniform vec3 camera_position;
-uniform vec3 lamp_direction[LAMPS];
+uniform int lamps;
+uniform vec4 lamp_place[LAMPS];       // xyz: towards a distant lamp (w = 0), or position in mm (w = 1)
 uniform vec3 lamp_irradiance[LAMPS];
-uniform float lamp_tangent[LAMPS];
-uniform mat4 lamp_matrix[LAMPS];
-uniform sampler2D lamp_depth_0;    // skin and eyes
-uniform sampler2D lamp_depth_1;
-uniform sampler2D lamp_strands_0;  // hair
-uniform sampler2D lamp_strands_1;
-uniform vec4 lobe_axis[LOBES];     // xyz, sharpness
-uniform vec3 lobe_colour[LOBES];
-uniform vec3 ambient;
+uniform vec4 lamp_falloff[LAMPS];     // c1, c2 per mm, c3 per mm^2; the limit of 1 / (c1 + c2 d + c3 d^2)
+uniform vec4 lamp_cone[LAMPS];        // xyz: axis away from the lamp, w: cosine of the outer angle (-2: no cone)
+uniform float lamp_ramp[LAMPS];       // cosine of the inner angle less that of the outer
+uniform float lamp_size[LAMPS];       // tangent of the angular radius, or the radius in mm
+uniform float lamp_search[LAMPS];     // mm in front of a point that are searched for what shades it
+uniform int lamp_layer[LAMPS];        // first layer of its shadow map; -1: none
+uniform int lamp_faces[LAMPS];        // layers: 1, or the 6 faces of a cube about the lamp
+uniform mat4 layer_matrix[LAYERS];    // world to the map: xy (over w), z in mm along the layer's axis
+uniform float layer_scale[LAYERS];    // uv per mm, for a cone at a depth of 1 mm
+uniform float depth_range;            // mm of depth 1 in the maps
+uniform sampler2DArray solid_depth;   // surfaces and eyes
+uniform sampler2DArray strand_depth;  // hair
+#include "shaders/environment.glsl"
 
-float lamp_depth(int lamp, vec2 at) { return lamp == 0 ? texture(lamp_depth_0, at).r : texture(lamp_depth_1, at).r; }
-float strand_depth(int lamp, vec2 at) { return lamp == 0 ? texture(lamp_strands_0, at).r : texture(lamp_strands_1, at).r; }
-vec2 lamp_texel() { return 1.0 / vec2(textureSize(lamp_depth_0, 0)); }
-// Lamp-space: uv and depth in mm.
-vec3 to_lamp(int lamp, vec3 p) {
-    vec3 q = (lamp_matrix[lamp] * vec4(p, 1.0)).xyz;
-    return vec3(q.xy * 0.5 + 0.5, q.z);
+bool distant(int lamp) { return lamp_place[lamp].w == 0.0; }
+vec3 lamp_towards(int lamp, vec3 p) {
+    return distant(lamp) ? lamp_place[lamp].xyz : normalize(lamp_place[lamp].xyz - p);
+}
+// Irradiance on a surface at p that faces the lamp, unshadowed.
+vec3 lamp_light(int lamp, vec3 p) {
+    if (distant(lamp)) return lamp_irradiance[lamp];
+    vec3 away = p - lamp_place[lamp].xyz;
+    float d = length(away);
+    vec4 c = lamp_falloff[lamp];
+    float falloff = min(1.0 / max(c.x + c.y * d + c.z * d * d, 1e-12), c.w);
+    float t = clamp((dot(away / d, lamp_cone[lamp].xyz) - lamp_cone[lamp].w) / max(lamp_ramp[lamp], 1e-6), 0.0, 1.0);
+    return lamp_irradiance[lamp] * falloff * (lamp_cone[lamp].w < -1.5 ? 1.0 : t * t);
 }
 
-float lamp_scale(int lamp) {  // uv per mm
-    return 0.5 * length(vec3(lamp_matrix[lamp][0].x, lamp_matrix[lamp][1].x, lamp_matrix[lamp][2].x));
+float layer_depth(int layer, vec2 at) { return texture(solid_depth, vec3(at, float(layer))).r * depth_range; }
+float layer_strands(int layer, vec2 at) { return texture(strand_depth, vec3(at, float(layer))).r * depth_range; }
+// The layer that sees p: the only one, or the cube's face (+x, -x, +y, -y, +z, -z).
+int layer_of(int lamp, vec3 p) {
+    if (lamp_faces[lamp] == 1) return lamp_layer[lamp];
+    vec3 d = p - lamp_place[lamp].xyz, a = abs(d);
+    int face = a.x >= a.y && a.x >= a.z ? (d.x < 0.0 ? 1 : 0) : a.y >= a.z ? (d.y < 0.0 ? 3 : 2) : (d.z < 0.0 ? 5 : 4);
+    return lamp_layer[lamp] + face;
+}
+// Map coordinates and depth in mm.
+vec3 to_layer(int layer, vec3 p) {
+    vec4 q = layer_matrix[layer] * vec4(p, 1.0);
+    return vec3(q.xy / q.w * 0.5 + 0.5, q.z);
+}
+float scale_of(int lamp, int layer, float depth) {  // uv per mm
+    return distant(lamp) ? layer_scale[layer] : layer_scale[layer] / max(depth, 1.0);
 }
 
 // Visibility of a lamp in [0, 1]: percentage-closer soft shadows (Fernando 2005) over a Vogel disc.
 float visibility(int lamp, vec3 p, vec3 n, float phase) {
-    float scale = lamp_scale(lamp);
-    float slope = clamp(1.0 - dot(n, lamp_direction[lamp]), 0.0, 1.0);
-    vec3 q = to_lamp(lamp, p + n * (0.35 + 0.9 * slope));
-    float search = 28.0 * lamp_tangent[lamp] * scale;
+    if (lamp_layer[lamp] < 0) return 1.0;
+    float slope = clamp(1.0 - dot(n, lamp_towards(lamp, p)), 0.0, 1.0);
+    vec3 inner = p + n * (0.35 + 0.9 * slope);
+    int layer = layer_of(lamp, inner);
+    vec3 q = to_layer(layer, inner);
+    float scale = scale_of(lamp, layer, q.z), size = lamp_size[lamp];
+    float reach = distant(lamp) ? size : size / max(q.z - lamp_search[lamp], 0.1 * q.z);
+    float search = lamp_search[lamp] * reach * scale;
     float sum = 0.0, count = 0.0;
     for (int k = 0; k < 12; ++k) {
-        float z = lamp_depth(lamp, q.xy + search * vogel(k, 12, phase));
+        float z = layer_depth(layer, q.xy + search * vogel(k, 12, phase));
         if (z < q.z - 0.6) { sum += z; count += 1.0; }
     }
     float lit = 1.0;
     if (count > 0.0) {
-        float penumbra = max((q.z - sum / count) * lamp_tangent[lamp], 0.25) * scale;
+        float blocker = sum / count;
+        float width = distant(lamp) ? (q.z - blocker) * size : size * (q.z - blocker) / max(blocker, 1.0);
+        float penumbra = max(width, 0.25) * scale;
         lit = 0.0;
         for (int k = 0; k < 24; ++k) {
             vec2 o = penumbra * vogel(k, 24, phase + 1.7);
-            lit += lamp_depth(lamp, q.xy + o) < q.z - 0.25 - 0.9 * length(o) / scale ? 0.0 : 1.0;
+            lit += layer_depth(layer, q.xy + o) < q.z - 0.25 - 0.9 * length(o) / scale ? 0.0 : 1.0;
         }
         lit /= 24.0;
     }
     float through = 0.0;  // strands: a fixed small disc
+    float texel = 1.0 / float(textureSize(strand_depth, 0).x);
     for (int k = 0; k < 12; ++k) {
-        vec2 o = max(0.8 * scale, 1.5 * lamp_texel().x) * vogel(k, 12, phase + 0.4);
-        through += strand_depth(lamp, q.xy + o) < q.z - 0.3 ? 0.0 : 1.0;
+        vec2 o = max(0.8 * scale, 1.5 * texel) * vogel(k, 12, phase + 0.4);
+        through += layer_strands(layer, q.xy + o) < q.z - 0.3 ? 0.0 : 1.0;
     }
     return lit * through / 12.0;
-}
-
-// Panels seen through a lobe of the given sharpness: the convolution of spherical Gaussians,
-// Tsai and Shih 2006, doi:10.1145/1141911.1141981, in its product-integral form.
-vec3 panels(vec3 direction, float sharpness) {
-    vec3 total = ambient;
-    for (int k = 0; k < LOBES; ++k) {
-        float a = lobe_axis[k].w, wide = a * sharpness / (a + sharpness);
-        total += lobe_colour[k] * (sharpness / (a + sharpness)) * exp(wide * (dot(lobe_axis[k].xyz, direction) - 1.0));
-    }
-    return total;
 }
 
 float schlick(float f0, float cosine) { return f0 + (1.0 - f0) * pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0); }

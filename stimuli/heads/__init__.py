@@ -32,7 +32,7 @@ def load_head(
     proportions.
     Raises stimuli.errors.InputError for a file that cannot be used, and without network and cache.
     """
-    if name_or_path == DEFAULT:
+    if name_or_path in (DEFAULT, "man"):
         from stimuli.heads import fetch, mpfb
         from stimuli.heads.model import default_model
 

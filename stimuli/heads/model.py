@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from renderer.scene import MASKS, Model, Proxy, Skin
+from renderer.scene import MASKS, Material, Model, Proxy, Surface
 from stimuli.heads import eyes, hair, skin
 from stimuli.heads.mpfb import Anatomy, Bust, Eyeball
 from stimuli.heads.subdivide import triangles
@@ -37,7 +37,7 @@ def default_model(anatomy: Anatomy, seed: int, hair_share: float = 1.0) -> Model
         skin.mean_albedo(coarse_mask),
         (pick @ anatomy.to_fine).tocsr(),
     )
-    surface = Skin(
+    surface = Surface(
         fine.positions[where].astype(np.float32),
         fine.normals[where].astype(np.float32),
         fine.uvs[uv].astype(np.float32),
@@ -168,7 +168,7 @@ def scan_model(scan) -> Model:
     else:
         proxy = Proxy(positions, normals, faces, albedo, sparse.identity(len(used), format="csr"))
     uvs = np.zeros((len(used), 2)) if scan.uvs is None else scan.uvs[used]
-    surface = Skin(
+    surface = Surface(
         positions.astype(np.float32),
         normals.astype(np.float32),
         uvs.astype(np.float32),
@@ -186,5 +186,5 @@ def scan_model(scan) -> Model:
         tuple(eyes.eyeball(ball) for ball in balls),
         None,
         _scan_landmarks(positions, eye_points),
-        procedural=False,
+        material=Material(albedo=tuple(float(v) for v in colour)),
     )

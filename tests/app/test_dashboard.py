@@ -28,7 +28,7 @@ def test_the_export_has_one_row_for_each_answer(person, experimenter, app):
     rows = table(response)
     assert len(rows) == 32 == int(response.headers["X-Row-Count"])
     with app.extensions["database"].read() as db:
-        columns = (Trial.framing, Trial.left, Trial.right, Trial.order, Response.answer)
+        columns = (Trial.cell, Trial.left, Trial.right, Trial.order, Response.answer)
         expected = db.execute(
             select(*columns).join(Response).order_by(Trial.participant_id, Trial.order)
         ).all()
@@ -114,9 +114,9 @@ def test_live_numbers_follow_the_answers(person, experimenter, app):
     with app.extensions["database"].read() as db:
         trial = db.scalars(select(Trial).order_by(Trial.order)).first()
     (framing,) = after["framings"]
-    assert framing["name"] == trial.framing and framing["total"] == 2 and framing["cr"] is None
+    assert framing["name"] == trial.cell and framing["total"] == 2 and framing["cr"] is None
     assert {t["name"]: t["score"] for t in framing["techniques"]} == {trial.right: 2, trial.left: 0}
-    assert after["participants"][0]["answered"] == 1 and "at " + trial.framing in after["html"]
+    assert after["participants"][0]["answered"] == 1 and "at " + trial.cell in after["html"]
 
 
 def test_priorities_appear_when_every_pair_is_answered(person, experimenter):

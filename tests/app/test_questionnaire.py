@@ -32,8 +32,7 @@ def test_trials_are_those_of_the_design_and_recorded(app, person):
             ).all()
             expected = trials(study.framings, study.techniques, study.seed, number)
             lists = [
-                [(t.order, t.framing, t.left, t.right) for t in some]
-                for some in (recorded, expected)
+                [(t.order, t.cell, t.left, t.right) for t in some] for some in (recorded, expected)
             ]
             assert lists[0] == lists[1]
             assert {t.seed for t in recorded} == {f"7/{number}"}

@@ -120,11 +120,9 @@ def test_answers_follow_the_published_findings(study_dir):
 
     for number in range(1, 201):
         for trial in trials(study.framings, study.techniques, study.seed, number):
-            answer, rt_ms = crowd.answer(
-                number, trial.order, trial.framing, trial.left, trial.right
-            )
+            answer, rt_ms = crowd.answer(number, trial.order, trial.cell, trial.left, trial.right)
             assert -2 <= answer <= 2 and rt_ms > 0
-            points[trial.framing][trial.left if answer < 0 else trial.right] += abs(answer)
+            points[trial.cell][trial.left if answer < 0 else trial.right] += abs(answer)
             sides.append(answer)
     close, half = points["close-up"], points["half-length"]
     assert sorted(close, key=close.get) == [
@@ -164,7 +162,7 @@ def test_answers_sent_are_answers_stored(study_dir):
         for response in db.scalars(select(Response)):
             trial = response.trial
             assert (response.answer, response.rt_ms) == crowd.answer(
-                1, trial.order, trial.framing, trial.left, trial.right
+                1, trial.order, trial.cell, trial.left, trial.right
             )
         assert db.get(Participant, 1).familiarity == crowd.familiarity(1)
     assert study.seed == 7

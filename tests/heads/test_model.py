@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import renderer
-from renderer.scene import MASKS
+from renderer.scene import MASKS, Environment
+from renderer.scene.graph import SceneGraph
 from stimuli.heads import fetch, mpfb, subdivide
 from stimuli.heads.model import default_model, scan_model
 
@@ -67,7 +68,7 @@ def test_the_default_head_is_an_adult_head_in_millimetres(anatomy):
 
 
 def test_model_parts_fit_together(model):
-    skin = model.skin
+    skin = model.surface
     assert (
         skin.masks.shape == (len(skin.positions), len(MASKS))
         and skin.masks.min() >= 0
@@ -109,8 +110,11 @@ def test_a_scan_renders(tmp_path):
     ball.export(file)
     scan = read_scan(file, unit="mm")
     model = scan_model(scan)
-    with renderer.Renderer(model, size=(160, 90), supersample=1, rays=16) as drawing:
-        result = drawing.frame("head-shot").render(renderer.make("golubev"))
+    graph = SceneGraph(Environment((0.5, 0.5, 0.5)), subject=model.landmarks["eyes"])
+    graph.add_model(model, np.eye(4))
+    with renderer.Renderer(graph, size=(160, 90), supersample=1, rays=16) as drawing:
+        frame = drawing.frame(renderer.FRAMINGS["head-shot"])
+        result = frame.render(renderer.make("golubev"))
     assert (result.samples > 0).mean() > 0.05 and result.image[result.samples > 0].mean() > 40
 
 
@@ -145,7 +149,8 @@ def test_an_uncoloured_scan_gets_eyes_and_loses_cards_and_shells(tmp_path):
     parts += [("EyeOcclusion", shell), ("Eyelashes", shell.copy())]
     write_parts(tmp_path / "head.obj", parts)
     model = scan_model(read_scan(tmp_path / "head.obj", unit="mm"))
-    assert len(model.skin.positions) == len(skull.vertices)  # eyes replaced, shell and cards gone
+    # eyes replaced, shell and cards gone
+    assert len(model.surface.positions) == len(skull.vertices)
     assert [round(float(eye.centre[0])) for eye in model.eyes] == [31, -31]
     assert all(abs(eye.radius - 12.3) < 0.2 for eye in model.eyes)
     np.testing.assert_allclose(model.landmarks["eyes"], [0, 4, 88], atol=0.5)
@@ -162,7 +167,7 @@ def test_a_large_scan_is_baked_on_a_cluster(monkeypatch, tmp_path):
     ball.export(file)
     monkeypatch.setattr(module, "PROXY_LIMIT", 1000)
     monkeypatch.setattr(module, "CLUSTER_MM", 12.0)
-    proxy = scan_model(read_scan(file, unit="mm")).skin.proxy
+    proxy = scan_model(read_scan(file, unit="mm")).surface.proxy
     assert len(proxy.positions) < 5000 and proxy.faces.max() < len(proxy.positions)
     assert (
         np.linalg.norm(

@@ -5,10 +5,29 @@ import pytest
 
 import renderer as package
 from renderer import gl
+from renderer.scene.graph import SceneGraph
+from stimuli import scenes
 from stimuli.heads import fetch, mpfb
 from stimuli.heads.model import default_model
 
 SIZE = (320, 180)
+
+
+def studio(model, **patch):
+    """A model under the thesis's light, as a graph; patch: over the scene's table."""
+    table = scenes.merge(scenes.load_table("thesis"), patch)
+    scene = scenes.read_scene(table)
+    graph = SceneGraph(scene.environment, scene.picture, model.landmarks["eyes"], scene.camera)
+    graph.add_model(model, np.eye(4))
+    for light in scene.lights.values():
+        graph.add_light(light)
+    return graph
+
+
+@pytest.fixture(scope="session")
+def stand():
+    """stand(model, **patch) -> graph: the model in the studio."""
+    return studio
 
 
 @pytest.fixture(scope="session")
@@ -23,13 +42,13 @@ def model(anatomy):
 
 @pytest.fixture(scope="session")
 def drawing(model):
-    with package.Renderer(model, size=SIZE, supersample=2, seed=0, rays=36) as renderer:
+    with package.Renderer(studio(model), size=SIZE, supersample=2, seed=0, rays=36) as renderer:
         yield renderer
 
 
 @pytest.fixture(scope="session")
 def frames(drawing):
-    return {name: drawing.frame(name) for name in package.FRAMINGS}
+    return {name: drawing.frame(camera) for name, camera in package.FRAMINGS.items()}
 
 
 @pytest.fixture(scope="session")

@@ -1,32 +1,24 @@
 """Baked light against closed forms."""
 
-from dataclasses import replace
-
 import numpy as np
 import trimesh
 
-from renderer.bake import bake_model
-from renderer.scene import Lamp, Studio
+from renderer.passes import bake as baking
+from renderer.scene import DistantLight, Environment, PointLight
 
-UNIFORM = Studio(lamps=(), lobes=(), ambient=(1.0, 0.5, 0.25))
+UNIFORM = Environment(ambient=(1.0, 0.5, 0.25))
 
 
-def bake(mesh, studio, albedo=(0.5, 0.5, 0.5), rays=256):
-    normals = mesh.vertex_normals
-    return bake_model(
-        mesh.vertices,
-        normals,
-        mesh.faces,
-        np.tile(albedo, (len(mesh.vertices), 1)),
-        (),
-        studio,
-        rays,
-        0,
-    )[0], normals
+def bake(mesh, lights=(), environment=UNIFORM, albedo=(0.5, 0.5, 0.5), rays=256):
+    """(light and openness of a mesh, its normals); environment: a value or a function."""
+    normals = np.asarray(mesh.vertex_normals)
+    body = baking.Body(mesh.vertices, normals, mesh.faces, np.tile(albedo, (len(normals), 1)))
+    radiance = getattr(environment, "radiance_of_panels", environment)
+    return baking.bake([body], lights, radiance, rays, 0)[0], normals
 
 
 def test_a_convex_body_in_uniform_light_gets_pi_times_the_radiance():
-    baked, normals = bake(trimesh.creation.icosphere(3, 80.0), UNIFORM)
+    baked, normals = bake(trimesh.creation.icosphere(3, 80.0))
     np.testing.assert_allclose(baked.openness, 1, atol=0.01)
     irradiance = np.einsum("nci,ni->nc", baked.light, normals)
     np.testing.assert_allclose(
@@ -41,11 +33,10 @@ def test_a_half_lit_sky_gives_the_known_irradiance():
     plus the mean).
     """
 
-    class Cosine(Studio):
-        def radiance(self, directions):
-            return np.repeat(np.maximum(directions[:, 1:2], 0), 3, axis=1)
+    def cosine(directions):
+        return np.repeat(np.maximum(directions[:, 1:2], 0), 3, axis=1)
 
-    baked, normals = bake(trimesh.creation.icosphere(3, 80.0), Cosine(lamps=(), lobes=()), rays=400)
+    baked, normals = bake(trimesh.creation.icosphere(3, 80.0), environment=cosine, rays=400)
     top = normals[:, 1].argmax()
     assert abs(baked.light[top, 0] @ normals[top] - 2 * np.pi / 3) < 0.05
 
@@ -59,24 +50,41 @@ def test_skin_lights_skin_and_colours_its_shadow():
     upper.apply_translation((0, 60, 0))
     upper.apply_translation((150, 0, 0))
     both = trimesh.util.concatenate([lower, upper])
-    dark = Studio(
-        lamps=(Lamp("key", (0, 1, 0), (5.0, 5.0, 5.0), 0.5),), lobes=(), ambient=(0.0, 0.0, 0.0)
-    )
-    baked, normals = bake(both, dark, albedo=(0.8, 0.2, 0.1))
+    lamp = DistantLight((5.0, 5.0, 5.0), direction=(0.0, 1.0, 0.0), radius_deg=0.5)
+    night = Environment()
+    baked, normals = bake(both, [lamp], night, albedo=(0.8, 0.2, 0.1))
     under = (both.vertices[:, 1] > 50) & (normals[:, 1] < -0.9) & (both.vertices[:, 0] < 100)
     irradiance = np.einsum("nci,ni->nc", baked.light, normals)[under]
     assert irradiance[:, 0].min() > 0.05
     assert (irradiance[:, 0] > 3 * irradiance[:, 1]).all() and (
         irradiance[:, 1] > irradiance[:, 2]
     ).all()
-    black, _ = bake(both, dark, albedo=(0.0, 0.0, 0.0))
+    black, _ = bake(both, [lamp], night, albedo=(0.0, 0.0, 0.0))
     np.testing.assert_allclose(black.light, 0, atol=1e-12)
 
 
 def test_the_bake_repeats_for_one_seed():
     mesh = trimesh.creation.icosphere(2, 50.0)
-    first, _ = bake(mesh, Studio(), rays=16)
-    second, _ = bake(mesh, Studio(), rays=16)
+    first, _ = bake(mesh, rays=16)
+    second, _ = bake(mesh, rays=16)
     np.testing.assert_array_equal(first.light, second.light)
-    dimmer = replace(Studio(), ambient=(0.0, 0.0, 0.0))
-    assert (bake(mesh, dimmer, rays=16)[0].light != first.light).any()
+    dimmer = Environment(ambient=(0.5, 0.5, 0.25))
+    assert (bake(mesh, environment=dimmer, rays=16)[0].light != first.light).any()
+
+
+def test_a_point_lamp_is_not_shaded_by_what_lies_behind_it():
+    """A sheet lit from 100 mm: E = E1 / d^2 in metres; a second sheet behind the lamp changes
+    nothing, one between takes the light.
+    """
+    sheet = trimesh.creation.box((20, 2, 20)).subdivide()
+    lamp = PointLight((0.02, 0.02, 0.02), position_mm=(0.0, 101.0, 0.0), radius_mm=0.0)
+    for height, expected in ((None, 2.0), (150.0, 2.0), (50.0, 0.0)):
+        parts = [sheet]
+        if height is not None:
+            other = trimesh.creation.box((40, 2, 40))
+            other.apply_translation((0, height, 0))
+            parts.append(other)
+        both = trimesh.util.concatenate(parts)
+        tracer = baking.Tracer(both.vertices, both.faces, [lamp], lambda d: 0 * d, 0)
+        got = tracer.lamps(np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 1.0, 0.0]]))
+        np.testing.assert_allclose(got, expected, rtol=1e-6)

@@ -83,16 +83,16 @@ def test_the_light_that_comes_through_is_added_for_scattering_techniques_alone(f
     assert all(kind.translucent for name, kind in renderer.TECHNIQUES.items() if name != "none")
 
 
-def test_a_frame_drawn_twice_has_the_same_bytes(model, results):
-    with renderer.Renderer(model, size=(320, 180), supersample=2, seed=0, rays=36) as second:
-        again = second.frame("head-shot").render(renderer.make("golubev_plus"))
+def test_a_frame_drawn_twice_has_the_same_bytes(model, stand, results):
+    with renderer.Renderer(stand(model), size=(320, 180), supersample=2, seed=0, rays=36) as second:
+        again = second.frame(renderer.FRAMINGS["head-shot"]).render(renderer.make("golubev_plus"))
     np.testing.assert_array_equal(again.image, results["head-shot"]["golubev_plus"].image)
     np.testing.assert_array_equal(again.samples, results["head-shot"]["golubev_plus"].samples)
 
 
-def test_another_seed_gives_another_skin(model, results):
-    with renderer.Renderer(model, size=(320, 180), supersample=2, seed=1, rays=36) as second:
-        other = second.frame("close-up").render(renderer.make("none"))
+def test_another_seed_gives_another_skin(model, stand, results):
+    with renderer.Renderer(stand(model), size=(320, 180), supersample=2, seed=1, rays=36) as second:
+        other = second.frame(renderer.FRAMINGS["close-up"]).render(renderer.make("none"))
     assert (other.image != results["close-up"]["none"].image).any()
 
 
@@ -184,10 +184,10 @@ def test_times_are_taken_of_every_technique(frames, techniques):
     )
 
 
-def test_sizes_out_of_range_are_refused(model):
+def test_sizes_out_of_range_are_refused(model, stand):
     for size, supersample in (((8, 90), 1), ((9000, 90), 1), ((5000, 90), 2), ((160, 90), 7)):
         with pytest.raises(InputError, match="expected"):
-            renderer.Renderer(model, size=size, supersample=supersample)
+            renderer.Renderer(stand(model), size=size, supersample=supersample)
 
 
 def test_a_program_wants_exactly_its_uniforms(drawing):

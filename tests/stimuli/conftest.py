@@ -4,14 +4,15 @@ heads.
 
 import hashlib
 import json
-import sys
+from contextlib import contextmanager
 from dataclasses import dataclass
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import PIL.Image
 import pytest
 
+from renderer.errors import InputError
 from stimuli.study import load_study
 
 TOML = """
@@ -28,10 +29,12 @@ seed = 5
 [[framings]]
 name = "near"
 label = "Near"
+set = { camera = { framing = "near", height_mm = 100.0, yaw_deg = 0.0 } }
 
 [[framings]]
 name = "far"
 label = "Far"
+set = { camera = { framing = "far", height_mm = 400.0, yaw_deg = 0.0 } }
 
 [[techniques]]
 name = "plain"
@@ -94,10 +97,6 @@ def ready_made(tmp_path):
     return folder
 
 
-class FakeInputError(ValueError):
-    exit_code = 2
-
-
 @dataclass(frozen=True)
 class Plain:
     pass
@@ -109,12 +108,12 @@ class Blur:
 
     def __post_init__(self):
         if not self.radius_mm > 0:
-            raise FakeInputError(f"radius_mm: got {self.radius_mm}, expected > 0")
+            raise InputError(f"radius_mm: got {self.radius_mm}, expected > 0")
 
 
 def make(technique, parameters):
     if technique not in ("plain", "blur"):
-        raise FakeInputError(f"no technique {technique!r}")
+        raise InputError(f"no technique {technique!r}")
     return Plain() if technique == "plain" else Blur(**parameters)
 
 
@@ -131,6 +130,7 @@ class FakeRenderer:
     driver = "fake"
     drawn = []
     frames = []
+    scenes = []
     stop_after = None
 
     def __enter__(self):
@@ -142,16 +142,19 @@ class FakeRenderer:
     def info(self):
         return {"version": "1", "gl_vendor": type(self).driver}
 
-    def frame(self, framing):
+    @contextmanager
+    def frame(self, camera, picture):
+        framing = camera.framing
         FakeRenderer.frames.append(framing)
 
         def render(parameters):
             if len(FakeRenderer.drawn) == FakeRenderer.stop_after:
                 raise KeyboardInterrupt
             FakeRenderer.drawn.append((framing, parameters))
-            colour = hashlib.sha256(repr((self, framing, parameters)).encode()).digest()[:3]
+            made_from = repr((self, framing, parameters, picture))
+            colour = hashlib.sha256(made_from.encode()).digest()[:3]
             image = np.tile(np.frombuffer(colour, np.uint8), (self.size[1], self.size[0], 1))
-            return SimpleNamespace(image=image, samples=np.array([[0, 4], [0, 9]], np.uint8))
+            return SimpleNamespace(image=image, samples=np.array([[0, 4], [0, 9]], np.uint16))
 
         def time(techniques, rounds):
             return {
@@ -159,31 +162,29 @@ class FakeRenderer:
                 for k, name in enumerate(techniques)
             }
 
-        return SimpleNamespace(render=render, time=time)
+        yield SimpleNamespace(render=render, time=time)
 
 
 @pytest.fixture
 def fake_renderer(monkeypatch):
-    """Puts the fake in the place of the renderer and of the heads, and returns its class."""
-    renderer, errors, heads = (
-        ModuleType("renderer"),
-        ModuleType("renderer.errors"),
-        ModuleType("stimuli.heads"),
-    )
-    errors.InputError = FakeInputError
-    renderer.errors, renderer.VERSION, renderer.Renderer = errors, "1", FakeRenderer
-    renderer.make, renderer.FRAMINGS = make, {"near": 1, "far": 2}
-    head = SimpleNamespace(
-        name="default",
-        model="sphere",
-        provenance={"source": "a sphere"},
-        licences=[{"what": "sphere", "licence": "CC0-1.0", "source": "here"}],
-        notes=("a sphere has no face",),
-    )
-    heads.load_head = lambda name, unit, seed, up: head
-    for module in (renderer, errors, heads):
-        monkeypatch.setitem(sys.modules, module.__name__, module)
-    for name, value in (("driver", "fake"), ("drawn", []), ("frames", []), ("stop_after", None)):
+    """Puts the fake in the place of the renderer and of the stage, and returns its class."""
+
+    def stage(scene, seed):
+        FakeRenderer.scenes.append(scene)
+        return SimpleNamespace(
+            graph=repr(scene.materials),
+            provenance={"source": "a sphere"},
+            licences=[{"what": "sphere", "licence": "CC0-1.0", "source": "here"}],
+            notes=("a sphere has no face",),
+        )
+
+    monkeypatch.setattr("renderer.frame.Renderer", FakeRenderer)
+    monkeypatch.setattr("renderer.frame.driver", lambda: FakeRenderer("", (), 1, 0).info())
+    monkeypatch.setattr("renderer.techniques.make", make)
+    monkeypatch.setattr("stimuli.scenes.stage", stage)
+    monkeypatch.setattr("stimuli.build._source", lambda module: "source")
+    for name, value in (("driver", "fake"), ("stop_after", None)):
         monkeypatch.setattr(FakeRenderer, name, value)
-    FakeRenderer.head = head
+    for name in ("drawn", "frames", "scenes"):
+        monkeypatch.setattr(FakeRenderer, name, [])
     return FakeRenderer

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 
+import numpy as np
 import PIL.Image
 import pytest
 
@@ -112,12 +113,46 @@ def test_other_rendering_renders_everything(small_study, fake_renderer, out, cha
     load_manifest(out)
 
 
-def test_other_head_or_source_renders_everything(small_study, fake_renderer, out, monkeypatch):
+def test_other_scene_or_source_renders_everything(small_study, fake_renderer, out, monkeypatch):
     build(small_study, out)
-    fake_renderer.head.provenance = {"source": "a cube"}
-    assert build(small_study, out) == built(4, 0)
-    monkeypatch.setattr(stimuli.build, "_source_digest", lambda: "another")
-    assert build(small_study, out) == built(4, 0)
+    noon = dataclasses.replace(small_study, scene={**small_study.scene, "rig": "noon"})
+    assert build(noon, out) == built(4, 0)
+    monkeypatch.setattr(stimuli.build, "_source", lambda module: "another")
+    assert build(noon, out) == built(4, 0)
+
+
+def test_a_scene_is_put_up_once_for_all_its_cameras(write_toml, fake_renderer, out):
+    """Two people: two scenes, each with two framings; another exposure is no other scene."""
+    people = (
+        '\n[[factors]]\nname = "skin"\nlabel = "Skin"\n'
+        '[[factors.levels]]\nname = "pale"\nlabel = "Pale"\n'
+        "set = { materials = { head = { melanin = 0.1 } } }\n"
+        '[[factors.levels]]\nname = "dark"\nlabel = "Dark"\n'
+        "set = { materials = { head = { melanin = 2.0 } }, picture = { exposure = 1.2 } }\n"
+    )
+    study = load_study(write_toml(write_toml().read_text() + people))
+    assert build(study, out) == built(8, 0)
+    assert [scene.materials["head"].melanin for scene in fake_renderer.scenes] == [0.1, 2.0]
+    assert fake_renderer.frames == ["near", "far"] * 2
+    images = load_manifest(out).images
+    assert images[0].levels == {"framing": "near", "skin": "pale"}
+    assert images[0].file == "images/near.pale_plain.png"
+    assert {image.scene["picture"]["exposure"] for image in images} == {0.76, 1.2}
+    (out / images[-1].file).unlink()
+    fake_renderer.scenes.clear()
+    assert build(study, out) == built(1, 7)
+    assert len(fake_renderer.scenes) == 1
+
+
+def test_a_users_file_leaves_its_name_and_its_hash_alone(write_toml, fake_renderer, out, tmp_path):
+    (tmp_path / "scan.glb").write_bytes(b"one")
+    text = write_toml().read_text() + '\n[head]\nname = "scan.glb"\n'
+    study = load_study(write_toml(text))
+    build(study, out)
+    assert str(tmp_path).encode() not in b"".join(contents(out).values())
+    assert load_manifest(out).images[0].scene["objects"]["head"]["file"] == "scan.glb"
+    (tmp_path / "scan.glb").write_bytes(b"two")
+    assert build(study, out) == built(4, 0)
 
 
 def test_image_changed_by_hand_is_rendered_again(small_study, fake_renderer, out):
@@ -169,7 +204,7 @@ def test_only_its_own_strays_are_removed(small_study, fake_renderer, out):
     shutil.copy(out / "images" / IMAGES[0], out / "images" / "mine.png")
     (out / "images" / IMAGES[2]).write_bytes(b"kept, since it was changed")
     (out / "study.sqlite3").write_bytes(b"answers")
-    near_only = dataclasses.replace(small_study, framings=small_study.framings[:1])
+    near_only = dataclasses.replace(small_study, cells=small_study.cells[:1])
     assert build(near_only, out) == built(0, 2)
     assert sorted(path.name for path in (out / "images").iterdir()) == sorted(
         [*IMAGES[:3], "mine.png"]
@@ -198,7 +233,7 @@ def test_foreign_record_is_refused(small_study, fake_renderer, out, text):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('"far"', '"farther"', r"framings\[1\]\.name: got 'farther', expected one of near, far"),
+        ("height_mm = 400.0, ", "", r"far: scene\.camera\.framing is 'far'; expected one of"),
         ('"blur"', '"blurred"', r"techniques\[1\]: no technique 'blurred'"),
         ("2.5", "-2.5", r"techniques\[1\]: radius_mm: got -2.5, expected > 0"),
     ],
@@ -219,7 +254,7 @@ def test_renderer_that_returns_another_size_is_a_defect(small_study, fake_render
     with pytest.raises(RuntimeError, match=r"rendered \(18, 32, 3\)"):
         stimuli.build._write_png(
             out,
-            fake_renderer("sphere", (32, 18), 1, 0).frame("near").render(None).image,
+            np.zeros((18, 32, 3), np.uint8),
             study.render.size,
         )
 

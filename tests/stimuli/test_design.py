@@ -21,7 +21,7 @@ def test_every_pair_once_within_each_framing(framings, techniques):
     )
     for participant in range(20):
         drawn = trials(framings, techniques, 3, participant)
-        assert Counter((t.framing, frozenset((t.left, t.right))) for t in drawn) == expected
+        assert Counter((t.cell, frozenset((t.left, t.right))) for t in drawn) == expected
         assert [t.order for t in drawn] == list(range(1, len(drawn) + 1))
 
 
@@ -65,7 +65,7 @@ def test_sides_are_balanced_over_participants():
     for participant in range(participants):
         for t in trials(FRAMINGS, TECHNIQUES, 20240601, participant):
             pair = tuple(sorted((t.left, t.right), key=TECHNIQUES.index))
-            left[t.framing, pair] += t.left == pair[0]
+            left[t.cell, pair] += t.left == pair[0]
     assert len(left) == 30
     assert min(binomtest(count, participants).pvalue for count in left.values()) > 0.001 / 30
 
@@ -79,7 +79,7 @@ def test_orders_are_uniform_over_participants():
             next(
                 t.order
                 for t in drawn
-                if t.framing == "head-shot" and {t.left, t.right} == {"none", "golubev"}
+                if t.cell == "head-shot" and {t.left, t.right} == {"none", "golubev"}
             )
         ] += 1
     assert chisquare([places[order] for order in range(1, 31)]).pvalue > 0.001

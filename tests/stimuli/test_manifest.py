@@ -56,7 +56,7 @@ def test_own_question_and_scale_are_kept(change):
     [
         (
             lambda m: m.update(format="other/1"),
-            r"format: got 'other/1', expected 'subdermal-manifest/1'",
+            r"format: got 'other/1', expected one of subdermal-manifest/1, subdermal-manifest/2",
         ),
         (lambda m: m.update(extra=1), r"extra: unknown key"),
         (lambda m: m.pop("study"), r"study: missing, expected a table"),

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from stimuli.errors import InputError
-from stimuli.study import THESIS, HeadChoice, Study, load_study, read_study
+from stimuli.scenes import load_table, read_scene
+from stimuli.study import THESIS, Study, load_study, read_study
 from stimuli.table import Table
 
 
@@ -26,7 +27,7 @@ def test_thesis_study():
     assert [level.value for level in study.scale] == [-2, -1, 0, 1, 2]
     assert len(study.familiarity.labels) == 5
     assert study.render.size == (1920, 1080)
-    assert study.head == HeadChoice("default")
+    assert study.scene == load_table("thesis") and study.questions == 30
 
 
 def test_what_is_asked_defaults_to_the_thesis(small_study):
@@ -45,7 +46,7 @@ def test_record_is_read_back(small_study):
     """What the manifest says of a study is the study, less how its images were made."""
     again = read_study(Table(small_study.record(), "manifest"))
     assert again.record() == small_study.record()
-    assert isinstance(again, Study) and again.render is None and again.head is None
+    assert isinstance(again, Study) and again.render is None and again.scene is None
 
 
 def test_what_is_declared_of_the_analysis_is_kept_as_written(small_study, write_toml):
@@ -64,7 +65,90 @@ def test_head_file_lies_beside_the_study(write_toml):
     path = write_toml(
         write_toml().read_text() + '\n[head]\nname = "scan.glb"\nunit = "cm"\nup = "z"\n'
     )
-    assert load_study(path).head == HeadChoice(str(path.parent / "scan.glb"), "cm", "z")
+    scene = load_study(path).scene
+    file = str(path.parent / "scan.glb")
+    assert scene["objects"]["head"] == {"shape": "scan", "file": file, "unit": "cm", "up": "z"}
+
+
+FACTORS = """
+[[factors]]
+name = "person"
+label = "Person"
+[[factors.levels]]
+name = "man"
+label = "A man"
+[[factors.levels]]
+name = "pale"
+label = "A pale man"
+set = { objects = { head = { person = "man" } }, materials = { head = { melanin = 0.05 } } }
+
+[[factors]]
+name = "light"
+label = "Light"
+[[factors.levels]]
+name = "studio"
+label = "Studio"
+[[factors.levels]]
+name = "noon"
+label = "Noon"
+"""
+
+
+def test_factors_are_crossed_and_their_levels_patch_the_scene(write_toml):
+    study = load_study(write_toml(write_toml().read_text() + FACTORS))
+    assert len(study.cells) == 8 and study.questions == 8
+    cell = study.cell("far.pale.noon")
+    assert cell.levels == {"framing": "far", "person": "pale", "light": "noon"}
+    assert study.cell_label(cell) == "Far, A pale man, Noon"
+    table = study.scene_of(cell)
+    assert table["rig"] == "noon" and table["materials"]["head"] == {"melanin": 0.05}
+    scene = read_scene(table)
+    assert list(scene.lights) == ["sun"] and scene.camera.framing == "far"
+    assert scene.materials["head"].melanin == 0.05
+    again = read_study(Table(study.record(), "manifest"))
+    assert again.cells == study.cells and again.record() == study.record()
+
+
+def test_cells_can_be_listed(write_toml):
+    cells = """
+[[cells]]
+framing = "near"
+person = "man"
+light = "noon"
+[[cells]]
+framing = "far"
+person = "pale"
+light = "studio"
+"""
+    study = load_study(write_toml(write_toml().read_text() + FACTORS + cells))
+    assert [cell.name for cell in study.cells] == ["near.man.noon", "far.pale.studio"]
+    assert read_study(Table(study.record(), "manifest")).cells == study.cells
+
+
+def test_a_study_without_framings_has_one(write_toml):
+    text = write_toml().read_text()
+    start, end = text.index("[[framings]]"), text.index("[[techniques]]")
+    study = load_study(write_toml(text[:start] + text[end:]))
+    assert [cell.name for cell in study.cells] == ["head-shot"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (FACTORS.replace('"light"', '"answer"'), r"factors\[1\]\.name: got 'answer'"),
+        (FACTORS.replace('"light"', '"weather"'), r"factors\[1\]\.levels\[0\]\.set: missing"),
+        (FACTORS.replace('"pale"', '"man"'), r"levels\[1\]\.name: got 'man', expected a value"),
+        (FACTORS + '[[cells]]\nframing = "near"\nperson = "man"', r"cells\[0\]\.light: missing"),
+    ],
+)
+def test_factors_at_fault_are_named(write_toml, text, message):
+    with pytest.raises(InputError, match=message):
+        load_study(write_toml(write_toml().read_text() + text))
+
+
+def test_consent_knows_its_placeholders(write_toml):
+    with pytest.raises(InputError, match=r"consent: got '\{people\}', expected one of"):
+        load_study(write_toml('consent = "{questions} of {people}"\n' + write_toml().read_text()))
 
 
 @pytest.mark.parametrize(

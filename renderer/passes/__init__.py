@@ -1,0 +1,1 @@
+"""What all techniques share: one module and its shaders a pass."""

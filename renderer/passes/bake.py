@@ -1,0 +1,239 @@
+"""Environment light with occlusion and interreflection, baked per vertex by ray tracing on the CPU.
+
+For every vertex, cosine-distributed rays meet either the environment or a surface; a surface that
+is hit sends back albedo / pi times its own irradiance (lamps with shadow rays, and the
+environment), for two bounces, so that occlusion is coloured: skin lights skin. Kept is the vector
+irradiance per channel, g = int_H L(w) w dw, from which E(n) = max(0, g . n) is exact at the vertex
+normal and first-order right for a bumped one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from renderer.scene.lights import DistantLight, Light, SpotLight
+
+BOUNCES = 2
+OFFSET_MM = 0.35
+CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh that light is baked on, in the world.
+
+    positions, normals, albedo (N, 3); faces (M, 3).
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    albedo: np.ndarray
+
+
+@dataclass(frozen=True)
+class Baked:
+    """light (N, 3, 3): vector irradiance, [vertex, channel, xyz]; openness (N,): the
+    cosine-weighted share of rays that leave.
+    """
+
+    light: np.ndarray
+    openness: np.ndarray
+
+
+def _hemisphere(n: int) -> np.ndarray:
+    """n cosine-distributed directions about +z on a Fibonacci spiral: (n, 3)."""
+    k = np.arange(n)
+    r = np.sqrt((k + 0.5) / n)
+    phi = 2.399963229728653 * k
+    return np.column_stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r**2)])
+
+
+def _frames(normals: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """Rotations (N, 3, 3) that take +z to each normal, turned about it by `spin` (N,) radians."""
+    sign = np.where(
+        normals[:, 2] >= 0, 1.0, -1.0
+    )  # Duff et al. 2017, "Building an orthonormal basis, revisited"
+    a = -1 / (sign + normals[:, 2])
+    b = normals[:, 0] * normals[:, 1] * a
+    t = np.column_stack([1 + sign * normals[:, 0] ** 2 * a, sign * b, -sign * normals[:, 0]])
+    s = np.column_stack([b, sign + normals[:, 1] ** 2 * a, -normals[:, 1]])
+    c, d = np.cos(spin)[:, None], np.sin(spin)[:, None]
+    return np.stack([c * t + d * s, c * s - d * t, normals], axis=2)
+
+
+def _intersector(mesh: trimesh.Trimesh):
+    """Embree where it is installed, trimesh's own (slow, kept) tracer elsewhere; said once."""
+    try:
+        return trimesh.ray.ray_pyembree.RayMeshIntersector(mesh)
+    except (ImportError, AttributeError, NameError):
+        import warnings
+
+        warnings.warn(
+            "embreex is not installed here: baking light with trimesh's own, slower tracer",
+            stacklevel=2,
+        )
+        return trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
+
+
+def _seen(light: Light, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit directions (N, 3) to the lamp, distance (N,) mm, and the factor of its irradiance."""
+    if isinstance(light, DistantLight):
+        towards = np.broadcast_to(light.towards, points.shape)
+        return towards, np.full(len(points), np.inf), np.ones(len(points))
+    away = points - light.place
+    distance = np.linalg.norm(away, axis=1)
+    away = away / np.maximum(distance, 1e-9)[:, None]
+    strength = light.falloff(distance)
+    if isinstance(light, SpotLight):
+        strength = strength * light.cone(away)
+    return -away, distance, strength
+
+
+class Tracer:
+    """The scene as rays see it: triangles, and the radiance that each sends back."""
+
+    def __init__(
+        self,
+        positions: np.ndarray,
+        faces: np.ndarray,
+        lights: Sequence[Light],
+        radiance: Callable[[np.ndarray], np.ndarray],
+        seed: int,
+    ):
+        self._mesh = trimesh.Trimesh(positions, faces, process=False, validate=False)
+        self._rays = _intersector(self._mesh)
+        self._lights, self._radiance, self._seed = lights, radiance, seed
+
+    def lamps(self, points: np.ndarray, normals: np.ndarray, rays: int = 6) -> np.ndarray:
+        """Irradiance (N, 3) from the lamps, with shadow rays."""
+        total = np.zeros((len(points), 3))
+        rng = np.random.default_rng([self._seed, 1])
+        for light in self._lights:
+            towards, distance, strength = _seen(light, points)
+            cosine = np.maximum(np.einsum("ni,ni->n", normals, towards), 0) * strength
+            facing = np.flatnonzero(cosine > 0)
+            lit = self._unshadowed(light, points, normals, facing, rays, rng, towards, distance)
+            total[facing] += (lit * cosine[facing])[:, None] * np.array(light.irradiance)
+        return total
+
+    def _unshadowed(self, light, points, normals, facing, rays, rng, towards, distance):
+        """The share of shadow rays that reach the lamp (F,)."""
+        if not light.shadow:
+            return np.ones(len(facing))
+        origin = np.repeat(points[facing] + OFFSET_MM * normals[facing], rays, axis=0)
+        spread = rng.normal(size=(len(origin), 3)) / 1.5
+        if isinstance(light, DistantLight):
+            spread *= np.tan(np.radians(light.radius_deg))
+            hit = self._rays.intersects_any(origin, light.towards + spread)
+            return 1 - hit.reshape(-1, rays).mean(axis=1)
+        aim = light.place + light.radius_mm * spread - origin
+        reach = np.linalg.norm(aim, axis=1)
+        aim /= reach[:, None]
+        first = self._rays.intersects_first(origin, aim)
+        hit = first >= 0
+        corner = self._mesh.triangles[first[hit], 0]
+        normal = self._mesh.face_normals[first[hit]]
+        ahead = np.einsum("ni,ni->n", corner - origin[hit], normal)
+        along = np.einsum("ni,ni->n", aim[hit], normal)
+        nearer = np.zeros(len(origin), bool)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            nearer[hit] = ahead / along < reach[hit] - OFFSET_MM
+        return 1 - nearer.reshape(-1, rays).mean(axis=1)
+
+    def gather(
+        self, points: np.ndarray, normals: np.ndarray, rays: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Directions (N, rays, 3) and the triangle that each ray meets, -1 for none (N, rays)."""
+        spin = np.random.default_rng([self._seed, 2]).uniform(0, 2 * np.pi, len(points))
+        local = _hemisphere(rays)
+        hits = np.empty((len(points), rays), dtype=np.int32)
+        directions = np.empty((len(points), rays, 3), dtype=np.float32)
+        for start in range(0, len(points), CHUNK):
+            part = slice(start, start + CHUNK)
+            d = np.einsum("nij,rj->nri", _frames(normals[part], spin[part]), local)
+            origin = np.repeat(points[part] + OFFSET_MM * normals[part], rays, axis=0)
+            hits[part] = self._rays.intersects_first(origin, d.reshape(-1, 3)).reshape(-1, rays)
+            directions[part] = d
+        return directions, hits
+
+    def collect(
+        self, normals: np.ndarray, directions: np.ndarray, hits: np.ndarray, sent: np.ndarray
+    ) -> Baked:
+        """Vector irradiance of rays that see the environment, or triangles that send radiance.
+
+        sent: (F, 3), the radiance of each triangle.
+        """
+        n, rays = hits.shape
+        light = np.empty((n, 3, 3))
+        for start in range(0, n, CHUNK):
+            part = slice(start, start + CHUNK)
+            d, h = directions[part].astype(float), hits[part]
+            radiance = self._radiance(d.reshape(-1, 3)).reshape(*h.shape, 3)
+            radiance = np.where(h[..., None] < 0, radiance, sent[h])
+            cosine = np.maximum(np.einsum("nri,ni->nr", d, normals[part]), 1e-3)
+            light[part] = np.pi * np.einsum("nrc,nri,nr->nci", radiance, d, 1 / cosine) / rays
+        return Baked(light, (hits < 0).mean(axis=1))
+
+
+def _smooth(values: np.ndarray, faces: np.ndarray, rounds: int) -> np.ndarray:
+    """Average each vertex with its neighbours: the bake's noise is per vertex."""
+    from scipy import sparse
+
+    i = faces.ravel()
+    j = np.roll(faces, 1, axis=1).ravel()
+    n = len(values)
+    link = sparse.csr_matrix((np.ones(2 * len(i)), (np.append(i, j), np.append(j, i))), (n, n))
+    link.data[:] = 1
+    link = sparse.diags(1 / np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)) @ link
+    flat = values.reshape(n, -1)
+    for _ in range(rounds):
+        flat = 0.5 * flat + 0.5 * (link @ flat)
+    return flat.reshape(values.shape)
+
+
+def bake(
+    bodies: Sequence[Body],
+    lights: Sequence[Light],
+    radiance: Callable[[np.ndarray], np.ndarray],
+    rays: int,
+    seed: int,
+) -> list[Baked]:
+    """The light on each body, with all of them in each other's way.
+
+    radiance: unit directions (N, 3) to the environment's radiance (N, 3); rays: per vertex.
+    """
+    start = np.cumsum([0] + [len(body.positions) for body in bodies])
+    faces = np.vstack(
+        [body.faces.astype(np.int64) + s for body, s in zip(bodies, start, strict=False)]
+    )
+    albedo = np.vstack([body.albedo for body in bodies])
+    points = np.vstack([body.positions for body in bodies]).astype(float)
+    normals = np.vstack([body.normals for body in bodies]).astype(float)
+    tracer = Tracer(points, faces, lights, radiance, seed)
+    lamps = tracer.lamps(points, normals)
+    directions, hits = tracer.gather(points, normals, rays)
+    # rays that start inside (folded lips, the back of the eyes) meet back faces: those send nothing
+    facing = tracer._mesh.face_normals[np.maximum(hits, 0)].astype(np.float32)
+    away = np.einsum("nri,nri->nr", directions, facing) > 0
+    blocked = np.where((hits >= 0) & away, len(faces), hits)
+    irradiance = lamps
+    for _ in range(BOUNCES + 1):
+        sent = (albedo * irradiance / np.pi)[faces].mean(axis=1)
+        sent = np.vstack([sent, np.zeros(3)])
+        baked = tracer.collect(normals, directions, blocked, sent)
+        irradiance = lamps + np.maximum(np.einsum("nci,ni->nc", baked.light, normals), 0)
+    parts = []
+    for k, body in enumerate(bodies):
+        piece = slice(start[k], start[k + 1])
+        parts.append(
+            Baked(
+                _smooth(baked.light[piece], body.faces, 2),
+                _smooth(baked.openness[piece], body.faces, 2),
+            )
+        )
+    return parts

@@ -1,0 +1,56 @@
+"""From scattered light to the picture: specular, hair, backdrop, tone map, resolve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from renderer import gl
+from renderer.gl import GL
+from renderer.passes.environment import Surroundings
+from renderer.scene.picture import BACKDROPS, TONE_MAPS, Picture
+from renderer.scene.view import View
+
+
+def composite(
+    context: gl.Context,
+    programs: Callable[..., gl.Program],
+    scattered: gl.Texture,
+    surface: gl.Target,
+    hair: gl.Target,
+    picture: Picture,
+    view: View,
+    surroundings: Surroundings,
+    supersample: int,
+) -> np.ndarray:
+    """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers."""
+    width, height = surface.width, surface.height
+    _, specular, albedo, depth_normal, _ = surface.textures
+    programs_uniforms = {
+        "scattered": scattered,
+        "specular": specular,
+        "albedo": albedo,
+        "depth_normal": depth_normal,
+        "hair": hair.textures[0],
+        "exposure": picture.exposure,
+        "tone_map": TONE_MAPS.index(picture.tone_map),
+        "backdrop": BACKDROPS.index(picture.backdrop),
+        "backdrop_centre": picture.centre,
+        "backdrop_edge": picture.edge,
+        "aspect": width / height,
+        "rays": view.rays(),
+        **surroundings.uniforms(),
+    }
+    program = programs("passes/composite.frag", surroundings.defines())
+    size = (width // supersample, height // supersample)
+    with gl.Target(width, height, [GL.GL_RGBA16F]) as colour:
+        colour.bind()
+        program.use(**program.accepts(programs_uniforms))
+        gl.draw_fullscreen(context)
+        with gl.Target(*size, [GL.GL_RGBA32F]) as final:
+            final.bind()
+            programs("passes/resolve.frag").use(colour_map=colour.textures[0], factor=supersample)
+            gl.draw_fullscreen(context)
+            pixels = final.textures[0].read()[..., :3]
+    return np.rint(pixels * 255).astype(np.uint8)

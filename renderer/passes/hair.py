@@ -1,0 +1,102 @@
+"""Hair: strands as ribbons towards the camera, far ones first, and towards a lamp."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from renderer import gl
+from renderer.passes.environment import Surroundings
+from renderer.passes.lamps import Lamps
+from renderer.passes.surfaces import Drawn
+from renderer.scene.graph import Item
+from renderer.scene.lights import DistantLight, Light
+
+EXTINCTION = 1.5  # of the whole layer of hair along its normal
+SHADOW_WIDTH_MM = 0.16  # of a strand in a lamp's map: finer ones would fall between its texels
+MINIMUM_PX = 1.3
+
+
+class Hair:
+    """The strands of one mesh, on the surface that they stand on."""
+
+    def __init__(self, item: Item, on: Drawn):
+        self.strands, pose = item.primitive.strands, item.pose
+        self.points = (self.strands.points @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32)
+        self.size = float(np.linalg.norm(pose[:3, 0]))
+        root = self.strands.root_vertex
+        turned = on.item.primitive.normals[root] @ pose[:3, :3].T / self.size
+        self.normals = turned.astype(np.float32)
+        light = on.baked.light[root]
+        self.environment = np.maximum(np.einsum("nci,ni->nc", light, self.normals), 0)
+
+    def shadow_ribbons(self, light: Light) -> gl.Mesh:
+        """Flat ribbons that face a lamp."""
+        tangent = np.gradient(self.points, axis=1)
+        facing = light.towards if isinstance(light, DistantLight) else light.place - self.points
+        across = np.cross(tangent, np.asarray(facing, np.float32))
+        across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-6)
+        count = self.points.shape[1]
+        taper = np.linspace(1.0, 0.4, count, dtype=np.float32)[None, :, None]
+        half = 0.5 * SHADOW_WIDTH_MM * self.size * taper * across
+        both = np.stack([self.points - half, self.points + half], axis=2)
+        return gl.Mesh({0: both.reshape(-1, 3)}, ribbon_faces(*self.points.shape[:2]))
+
+    def draw(
+        self,
+        programs: Callable[..., gl.Program],
+        lamps: Lamps,
+        surroundings: Surroundings,
+        shared: dict,
+        pixels_per_mm: float,
+    ) -> None:
+        """Blend all strands into the bound target; shared: camera_position, view, projection."""
+        strands = self.strands
+        distance = np.linalg.norm(self.points.mean(axis=1) - shared["camera_position"], axis=1)
+        order = np.argsort(-distance, kind="stable")  # far strands first: blended back to front
+        points = self.points[order]
+        n, p = points.shape[:2]
+        tangent = np.gradient(points, axis=1)
+        tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-6)
+
+        def twice(array: np.ndarray) -> np.ndarray:
+            return np.repeat(array.reshape(n * p, -1).astype(np.float32), 2, axis=0)
+
+        def per_strand(array: np.ndarray) -> np.ndarray:
+            return twice(np.repeat(array[order][:, None, :], p, axis=1))
+
+        strand = np.empty((2 * n * p, 4), np.float32)
+        strand[:, 0] = np.tile([-1.0, 1.0], n * p)
+        strand[:, 1:2] = twice(np.repeat(self.size * strands.width_mm[order][:, None], p, axis=1))
+        strand[:, 2:3] = twice(strands.cover[order])
+        strand[:, 3:4] = twice(np.tile(np.linspace(0, 1, p), (n, 1)))
+        attributes = {
+            0: twice(points),
+            1: twice(tangent),
+            2: strand,
+            3: per_strand(strands.colour),
+            4: per_strand(self.environment),
+            5: per_strand(self.normals),
+        }
+        mesh = gl.Mesh(attributes, ribbon_faces(n, p))
+        defines = {**lamps.defines(), **surroundings.defines()}
+        program = programs("passes/hair.frag", defines, vertex="passes/hair.vert")
+        values = {
+            **shared,
+            **lamps.uniforms(),
+            **surroundings.uniforms(),
+            "pixels_per_mm": pixels_per_mm,
+            "minimum_px": MINIMUM_PX,
+            "extinction": EXTINCTION,
+        }
+        program.use(**program.accepts(values))
+        mesh.draw()
+        mesh.delete()
+
+
+def ribbon_faces(strands: int, points: int) -> np.ndarray:
+    """Triangles (2 S (P - 1), 3) of S ribbons of P point pairs, strand by strand."""
+    base = (np.arange(strands)[:, None] * points + np.arange(points - 1)[None]).ravel() * 2
+    corners = [base, base + 1, base + 2, base + 1, base + 3, base + 2]
+    return np.stack(corners, axis=1).reshape(-1, 3)

@@ -1,0 +1,168 @@
+"""Lamps as the shaders take them, and their shadow maps: layers of depth, one or six a lamp."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from renderer import gl
+from renderer.scene.graph import look_at
+from renderer.scene.lights import DistantLight, Light, PointLight, SpotLight
+
+MARGIN_MM = 2.0  # around what is seen from a distant lamp
+NEAREST_MM = 1.0  # of a cone's depths
+_CUBE = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One map: matrix (4, 4), world to xy over w and depth in mm; scale: uv per mm (at 1 mm)."""
+
+    matrix: np.ndarray
+    scale: float
+    farthest_mm: float
+
+
+def distant_layer(light: DistantLight, points: np.ndarray) -> Layer:
+    """A box around points (N, 3), seen along the light; depth from its nearest point."""
+    turn = look_at(light.towards, np.zeros(3))[:3, :3]
+    local = points @ turn
+    low, high = local.min(axis=0) - MARGIN_MM, local.max(axis=0) + MARGIN_MM
+    half = 0.5 * (high - low)[:2].max()
+    centre = 0.5 * (low + high)
+    matrix = np.eye(4)
+    matrix[0, :3], matrix[1, :3] = turn[:, 0] / half, turn[:, 1] / half
+    matrix[:2, 3] = -centre[:2] / half
+    matrix[2, :3], matrix[2, 3] = -turn[:, 2], high[2]
+    return Layer(matrix, 0.5 / half, float(high[2] - low[2]))
+
+
+def cone_layer(place: np.ndarray, axis: np.ndarray, half_deg: float, points: np.ndarray) -> Layer:
+    """A cone of a half angle (of the square map) from a place along a unit axis."""
+    pose = look_at(np.zeros(3), axis)
+    turn = pose[:3, :3]
+    away = (points - place) @ -turn[:, 2]
+    cotangent = 1 / np.tan(np.radians(half_deg))
+    matrix = np.zeros((4, 4))
+    matrix[0, :3], matrix[1, :3] = cotangent * turn[:, 0], cotangent * turn[:, 1]
+    matrix[2, :3] = matrix[3, :3] = -turn[:, 2]
+    matrix[:, 3] = -matrix[:, :3] @ place
+    return Layer(matrix, 0.5 * cotangent, float(max(away.max(), NEAREST_MM)) + MARGIN_MM)
+
+
+def layers_of(light: Light, points: np.ndarray) -> list[Layer]:
+    """The layers of a lamp over all points (N, 3) of the scene: none without shadow.
+
+    A point lamp outside of the scene sees it in one cone, one among the objects in a cube of six.
+    """
+    if not light.shadow:
+        return []
+    if isinstance(light, DistantLight):
+        return [distant_layer(light, points)]
+    assert isinstance(light, PointLight)
+    if isinstance(light, SpotLight) and light.outer_deg < 75:
+        return [cone_layer(light.place, light.along, light.outer_deg + 1.0, points)]
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = 0.5 * (low + high)
+    away = points - light.place
+    distance = np.linalg.norm(away, axis=1)
+    axis = centre - light.place
+    length = np.linalg.norm(axis)
+    outside = length > 0 and distance.min() > NEAREST_MM
+    if outside:
+        axis = axis / length
+        cosine = ((away / distance[:, None]) @ axis).min()
+        if cosine > np.cos(np.radians(65)):
+            half = float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))) + 1.0
+            return [cone_layer(light.place, axis, half, points)]
+    return [cone_layer(light.place, np.array(side, float), 45.0, points) for side in _CUBE]
+
+
+class Lamps:
+    """The lamps of a scene with their maps; `uniforms` gives what lighting.glsl takes.
+
+    map_size: pixels of a map's side; points (N, 3): everything that casts shadows, mm.
+    """
+
+    def __init__(self, lights: Sequence[Light], points: np.ndarray, map_size: int):
+        self.lights = list(lights)
+        self.layers: list[Layer] = []
+        self.first: list[int] = []
+        self.faces: list[int] = []
+        for light in self.lights:
+            layers = layers_of(light, points)
+            self.first.append(len(self.layers) if layers else -1)
+            self.faces.append(len(layers))
+            self.layers += layers
+        self.depth_range = 1.01 * max((layer.farthest_mm for layer in self.layers), default=1.0)
+        size, count = (map_size, len(self.layers)) if self.layers else (1, 1)
+        self.solid, self.strands = gl.DepthArray(size, count), gl.DepthArray(size, count)
+
+    def draw(self, program: gl.Program, solid, strands) -> None:
+        """Draw all layers; solid, strands: (lamp, draw(**uniforms)) -> None, called for each."""
+        for k, light in enumerate(self.lights):
+            for face in range(self.faces[k]):
+                index = self.first[k] + face
+                shared = {"layer": self.layers[index].matrix, "depth_range": self.depth_range}
+                self.solid.bind_layer(index)
+                solid(light, program, shared)
+                self.strands.bind_layer(index)
+                strands(light, program, shared)
+
+    def defines(self) -> dict[str, int]:
+        """Sizes of the shaders' arrays."""
+        return {"LAMPS": max(1, len(self.lights)), "LAYERS": max(1, len(self.layers))}
+
+    def uniforms(self) -> dict:
+        """What lighting.glsl takes of lamps; arrays are padded to one entry where there is none."""
+        lights = self.lights or [DistantLight(irradiance=(0.0, 0.0, 0.0), shadow=False)]
+        layers = self.layers or [Layer(np.eye(4), 1.0, 1.0)]
+        positional = [isinstance(light, PointLight) for light in lights]
+        place = [
+            np.append(light.place if point else light.towards, float(point))
+            for light, point in zip(lights, positional, strict=True)
+        ]
+        return {
+            "lamps": len(self.lights),
+            "lamp_place": np.array(place),
+            "lamp_irradiance": np.array([light.irradiance for light in lights]),
+            "lamp_falloff": np.array([_falloff(light) for light in lights]),
+            "lamp_cone": np.array([_cone(light)[:4] for light in lights]),
+            "lamp_ramp": np.array([_cone(light)[4] for light in lights]),
+            "lamp_size": np.array([_size(light) for light in lights]),
+            "lamp_search": np.array([light.search_mm for light in lights]),
+            "lamp_layer": np.array(self.first or [-1]),
+            "lamp_faces": np.array(self.faces or [0]),
+            "layer_matrix": np.array([layer.matrix for layer in layers]),
+            "layer_scale": np.array([layer.scale for layer in layers]),
+            "depth_range": self.depth_range,
+            "solid_depth": self.solid.array,
+            "strand_depth": self.strands.array,
+        }
+
+    def delete(self) -> None:
+        self.solid.delete()
+        self.strands.delete()
+
+
+def _falloff(light: Light) -> tuple[float, float, float, float]:
+    if not isinstance(light, PointLight):
+        return (1.0, 0.0, 0.0, 1e9)
+    c1, c2, c3 = light.attenuation
+    return (c1, c2 * 1e-3, c3 * 1e-6, light.attenuation_limit)
+
+
+def _cone(light: Light) -> tuple[float, ...]:
+    if not isinstance(light, SpotLight):
+        return (0.0, 0.0, 0.0, -2.0, 1.0)
+    inner, outer = np.cos(np.radians([light.inner_deg, light.outer_deg]))
+    return (*light.along, float(outer), float(inner - outer))
+
+
+def _size(light: Light) -> float:
+    if isinstance(light, PointLight):
+        return light.radius_mm
+    assert isinstance(light, DistantLight)
+    return float(np.tan(np.radians(light.radius_deg)))

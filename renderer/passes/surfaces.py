@@ -1,0 +1,246 @@
+"""Surfaces and eyes under the scene's light, drawn over a domain by the same shading code.
+
+A domain is where a fragment lies: the screen, an object's texture atlas, or points that are listed
+one by one; the lamps' own views (depth alone) are `renderer.passes.lamps`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from renderer import gl
+from renderer.gl import GL
+from renderer.passes.bake import Baked, Body, bake
+from renderer.passes.environment import Surroundings
+from renderer.passes.lamps import Lamps
+from renderer.profiles import gaussians
+from renderer.scene.graph import Contents, Item
+from renderer.scene.material import Material, Skin
+from renderer.scene.model import MASKS
+
+THICKNESS_SCALE = 0.38  # mm of slab per mm of depth-map thickness
+TRANSMISSION_WRAP = 0.10  # E = saturate(wrap + L . -N): 0 is exact, the published shader uses 0.3
+#: Irradiance and the material's id; specular; albedo; depth and normal; what comes through.
+FORMATS = (GL.GL_RGBA32F, GL.GL_RGBA16F, GL.GL_RGBA16F, GL.GL_RGBA32F, GL.GL_RGBA16F)
+#: The same over an atlas or points, with the place in the world.
+PLACED_FORMATS = (*FORMATS, GL.GL_RGBA32F)
+MAPS = ("albedo_map", "normal_map", "roughness_map")
+
+Program = Callable[..., gl.Program]
+
+
+@dataclass
+class Drawn:
+    """A surface or an eye on the graphics card. id: of the scattering material, 0 for none."""
+
+    item: Item
+    mesh: gl.Mesh
+    baked: Baked
+    id: int = 0
+    maps: dict[str, gl.Texture] | None = None
+
+
+class Surfaces:
+    """All surfaces and eyes of a scene, with the light that was baked on them.
+
+    media: the media that scatter, in the order of their ids, 1 first.
+    """
+
+    def __init__(
+        self, found: Contents, lights: Sequence, surroundings: Surroundings, rays: int, seed: int
+    ):
+        self.seed = seed
+        items = [*found.surfaces, *found.eyes]
+        bodies = [_body(item) for item in items]
+        baked = bake(bodies, lights, surroundings.radiance, rays, seed) if bodies else []
+        self.media: list[str | dict] = []
+        self.surfaces = [
+            self._surface(item, b) for item, b in zip(found.surfaces, baked, strict=False)
+        ]
+        eyes = baked[len(found.surfaces) :]
+        self.eyes = [_eye(item, b) for item, b in zip(found.eyes, eyes, strict=True)]
+
+    def _surface(self, item: Item, baked: Baked) -> Drawn:
+        part = item.primitive
+        material: Material = part.material.value
+        light = part.proxy.to_full @ baked.light.reshape(-1, 9)
+        openness = part.proxy.to_full @ baked.openness[:, None]
+        scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
+        mesh = gl.Mesh(_attributes(part, part.masks, light, openness, scatters), part.indices)
+        number = 0
+        if material.scatters and np.any(scatters):
+            if material.medium not in self.media:
+                self.media.append(material.medium)
+            number = 1 + self.media.index(material.medium)
+        maps = {name: _map(getattr(part.material, name)) for name in MAPS}
+        return Drawn(item, mesh, Baked(light.reshape(-1, 3, 3), openness[:, 0]), number, maps)
+
+    def vertices(self) -> np.ndarray:
+        """All positions (N, 3) in the world, mm."""
+        drawn = [*self.surfaces, *self.eyes]
+        return np.vstack([_world(d.item, d.item.primitive.positions) for d in drawn])
+
+    def draw_depth(self, program: gl.Program, shared: dict) -> None:
+        """Only where the surfaces are, with a program that takes `model`."""
+        for drawn in (*self.surfaces, *self.eyes):
+            program.use(**program.accepts({**shared, "model": drawn.item.pose}))
+            drawn.mesh.draw()
+
+    def draw(
+        self,
+        programs: Program,
+        lamps: Lamps,
+        surroundings: Surroundings,
+        shared: dict,
+        domain: str = "SCREEN",
+        only: Drawn | None = None,
+        mesh: gl.Mesh | None = None,
+    ) -> None:
+        """Shade into the bound target: everything, or over a domain `only` one surface.
+
+        shared: camera_position, view, projection (and points_size, point_mm for POINTS);
+        mesh: drawn in the place of the surface's own (points on it).
+        """
+        defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": domain}
+        values = {**shared, **lamps.uniforms(), **surroundings.uniforms()}
+        program = programs("passes/skin.frag", defines, vertex="passes/surface.vert")
+        for drawn in self.surfaces if only is None else [only]:
+            program.use(**program.accepts({**values, **self._material(drawn)}))
+            (mesh or drawn.mesh).draw()
+        if only is not None:
+            return
+        program = programs("passes/eye.frag", defines, vertex="passes/surface.vert")
+        for drawn in self.eyes:
+            eye, pose = drawn.item.primitive.eye, drawn.item.pose
+            size = np.linalg.norm(pose[:3, 0])
+            own = {
+                "model": pose,
+                "centre": pose[:3, :3] @ eye.centre + pose[:3, 3],
+                "gaze": pose[:3, :3] @ eye.gaze / size,
+                "radius": eye.radius * size,
+                "iris_radius": eye.iris_radius * size,
+            }
+            program.use(**program.accepts({**values, **own}))
+            drawn.mesh.draw()
+
+    def _material(self, drawn: Drawn) -> dict:
+        """The uniforms of a surface's material."""
+        part = drawn.item.primitive
+        material, marks = part.material.value, part.landmarks
+        skin = material if isinstance(material, Skin) else Skin()
+        rng = np.random.default_rng([self.seed, 3])
+        nowhere = np.zeros(3)
+        return {
+            "model": drawn.item.pose,
+            "procedural": int(isinstance(material, Skin) and part.material.albedo_map is None),
+            "noise_origin": rng.uniform(100, 900, 3),
+            **{name: marks.get(name, nowhere) for name in ("eye_l", "eye_r", "mouth", "nose")},
+            **{f"has_{name}": getattr(part.material, name) is not None for name in MAPS},
+            **drawn.maps,
+            "albedo_colour": material.albedo,
+            "roughness": material.roughness,
+            "f0": material.f0,
+            "specular_strength": material.specular,
+            "lobe_roughness": material.lobe_roughness,
+            "lobe_share": material.lobe_share,
+            "material_id": float(drawn.id),
+            "melanin": skin.melanin,
+            "blood": skin.blood,
+            "flush": skin.flush,
+            "mottling": skin.mottling,
+            "melanin_absorbance": skin.melanin_absorbance,
+            "blood_absorbance": skin.blood_absorbance,
+            "dermis": skin.dermis,
+            "lip": skin.lip,
+            "freckles": skin.freckles,
+            "freckle_share": skin.freckle_share,
+            "moles": skin.moles,
+            "mole_share": skin.mole_share,
+            "beard_tint": skin.beard,
+            "scalp_tint": skin.scalp,
+            "pore_depth": skin.pores,
+            "furrow_depth": skin.furrows,
+            "bump_height": skin.bumps,
+            "wrinkle_depth": skin.wrinkles,
+            "lip_folds": skin.lip_folds,
+            "roughness_dry": skin.roughness_dry,
+            "roughness_oily": skin.roughness_oily,
+            "gaussian_falloff": 0.5 / gaussians.SKIN_VARIANCE_MM2,
+            "gaussian_weight": gaussians.SKIN_WEIGHTS,
+            "thickness_scale": THICKNESS_SCALE,
+            "transmission_wrap": TRANSMISSION_WRAP,
+        }
+
+    def points(self, drawn: Drawn, faces: np.ndarray, weights: np.ndarray) -> gl.Mesh:
+        """Points on a surface as a mesh: triangles (K,) and barycentric weights (K, 3)."""
+        part = drawn.item.primitive
+        corners = np.asarray(part.indices).reshape(-1, 3)[faces]
+        scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
+        light = drawn.baked.light.reshape(-1, 9)
+        whole = _attributes(part, part.masks, light, drawn.baked.openness[:, None], scatters)
+
+        def at(array: np.ndarray) -> np.ndarray:
+            return np.einsum("kc,kca->ka", weights, np.asarray(array)[corners])
+
+        return gl.Mesh({where: at(array) for where, array in whole.items()})
+
+
+def _world(item: Item, positions: np.ndarray) -> np.ndarray:
+    return positions @ item.pose[:3, :3].T + item.pose[:3, 3]
+
+
+def _turned(item: Item, normals: np.ndarray) -> np.ndarray:
+    turned = np.asarray(normals, float) @ item.pose[:3, :3].T
+    return turned / np.linalg.norm(item.pose[:3, 0])
+
+
+def _body(item: Item) -> Body:
+    part = item.primitive
+    if hasattr(part, "proxy"):
+        proxy = part.proxy
+        positions, normals = _world(item, proxy.positions), _turned(item, proxy.normals)
+        return Body(positions, normals, proxy.faces, np.asarray(proxy.albedo))
+    positions, normals = _world(item, part.positions), _turned(item, part.normals)
+    grey = np.full((len(positions), 3), 0.5)
+    return Body(positions, normals, np.asarray(part.indices).reshape(-1, 3), grey)
+
+
+def _attributes(part, masks, light, openness, scatters) -> dict[int, np.ndarray]:
+    """What surface.vert reads, by location."""
+    count = len(part.positions)
+    uvs = np.zeros((count, 2)) if part.texcoord_0 is None else part.texcoord_0
+    return {
+        0: part.positions,
+        1: part.normals,
+        2: uvs,
+        3: masks[:, :4],
+        4: masks[:, 4:],
+        5: light[:, 0:3],
+        6: light[:, 3:6],
+        7: light[:, 6:9],
+        8: np.column_stack([openness, scatters]),
+    }
+
+
+def _eye(item: Item, baked: Baked) -> Drawn:
+    part = item.primitive
+    count = len(part.positions)
+    flat = baked.light.reshape(-1, 9)
+    attributes = _attributes(
+        part, np.zeros((count, len(MASKS))), flat, baked.openness[:, None], np.zeros(count)
+    )
+    return Drawn(item, gl.Mesh(attributes, part.indices), baked)
+
+
+def _map(image: np.ndarray | None) -> gl.Texture:
+    """A material's map, (H, W) or (H, W, 3) uint8, row 0 at the top; one texel for none."""
+    if image is None:
+        return gl.Texture(1, 1, GL.GL_RGBA8)
+    if image.ndim == 2:
+        image = np.repeat(image[..., None], 3, axis=2)
+    rgba = np.dstack([image, np.full(image.shape[:2], 255, dtype=np.uint8)])[::-1]
+    height, width = rgba.shape[:2]
+    return gl.Texture(width, height, GL.GL_RGBA8, linear=True, data=rgba, mipmap=True, repeat=True)

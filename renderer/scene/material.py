@@ -1,0 +1,123 @@
+"""Materials: what light meets at a surface and below it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from renderer.errors import InputError
+from renderer.parameters import Parameters, parameter
+
+_SHARE = {"low": 0.0, "high": 1.0}
+
+
+@dataclass(frozen=True)
+class Material(Parameters):
+    """A surface of one colour, or with maps, over a medium that scatters or does not.
+
+    medium: a preset's name or a table of coefficients (renderer.medium), "" for a surface that
+    does not scatter. albedo is linear, the share of diffuse light that comes back. Maps are image
+    files (a scan brings its own): albedo in sRGB, normals in tangent space, roughness grey.
+    """
+
+    kind: ClassVar[str] = "plain"
+    called: ClassVar[str] = "material"
+
+    medium: str | dict = "skin"
+    albedo: tuple[float, float, float] = parameter(
+        (0.56, 0.38, 0.30), source="light skin, chosen by eye", **_SHARE
+    )
+    roughness: float = parameter(
+        0.36, unit="Beckmann slope", low=0.02, high=1.0, source="chosen by eye"
+    )
+    f0: float = parameter(0.028, low=0.0, high=1.0, source="Fresnel at an index of 1.4")
+    specular: float = parameter(1.0, low=0.0, high=10.0, source="1 is physical")
+    lobe_roughness: tuple[float, float] = parameter(
+        (0.85, 1.5), unit="of the roughness", low=0.1, high=3.0, source="chosen by eye"
+    )
+    lobe_share: float = parameter(0.25, source="of the second lobe, chosen by eye", **_SHARE)
+    albedo_map: str = ""
+    normal_map: str = ""
+    roughness_map: str = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("albedo_map", "normal_map", "roughness_map"):
+            value = getattr(self, name)
+            if not isinstance(value, str):
+                raise InputError(f"{self.where(name)} is {value!r:.60}; expected a file")
+        if not isinstance(self.medium, str | Mapping):
+            raise InputError(
+                f"{self.where('medium')} is {self.medium!r:.60}; "
+                "expected a preset's name or a table of coefficients"
+            )
+
+    def plain(self) -> dict[str, Any]:
+        return {"kind": self.kind, **super().plain()}
+
+    @property
+    def scatters(self) -> bool:
+        """Whether there is a medium below the surface."""
+        return bool(self.medium)
+
+
+@dataclass(frozen=True)
+class Skin(Material):
+    """Procedural skin: pigments, pores, furrows and hair below the surface over the solid noise.
+
+    The masks of a head (lips, flush, beard, ...) say where; `relief` scales its heights.
+    """
+
+    kind: ClassVar[str] = "skin"
+
+    melanin: float = parameter(
+        0.20, unit="optical depth", low=0.0, high=8.0, source="chosen by eye; darker is more"
+    )
+    blood: float = parameter(0.21, unit="optical depth", low=0.0, high=4.0, source="chosen by eye")
+    melanin_absorbance: tuple[float, float, float] = parameter(
+        (0.55, 1.15, 1.75), low=0.0, high=10.0, source="chosen by eye after Jacques 2013"
+    )
+    blood_absorbance: tuple[float, float, float] = parameter(
+        (0.12, 1.05, 0.85), low=0.0, high=10.0, source="chosen by eye after Jacques 2013"
+    )
+    dermis: tuple[float, float, float] = parameter(
+        (0.770, 0.610, 0.520), source="pale dermis without pigment, chosen by eye", **_SHARE
+    )
+    lip: tuple[float, float, float] = parameter(
+        (0.50, 0.215, 0.195), source="chosen by eye", **_SHARE
+    )
+    flush: float = parameter(0.34, unit="optical depth", low=0.0, high=4.0, source="by eye")
+    mottling: float = parameter(1.0, low=0.0, high=5.0, source="of what was chosen by eye")
+    freckles: float = parameter(
+        0.14, unit="optical depth", low=0.0, high=4.0, source="chosen by eye"
+    )
+    freckle_share: float = parameter(0.28, source="of cells of 7.5 mm, by eye", **_SHARE)
+    moles: float = parameter(0.65, unit="optical depth", low=0.0, high=4.0, source="by eye")
+    mole_share: float = parameter(0.20, source="of cells of 31 mm, by eye", **_SHARE)
+    beard: float = parameter(1.0, low=0.0, high=1.3, source="tint of shaven skin, by eye")
+    scalp: float = parameter(0.9, source="darkening under hair, by eye", **_SHARE)
+    pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.042 and 0.022 mm")
+    furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.015 mm")
+    bumps: float = parameter(1.0, low=0.0, high=5.0, source="height, of 0.022 to 0.16 mm")
+    wrinkles: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.020 to 0.045 mm")
+    lip_folds: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.040 mm")
+    roughness_dry: float = parameter(
+        0.42, unit="Beckmann slope", low=0.02, high=1.0, source="chosen by eye"
+    )
+    roughness_oily: float = parameter(
+        0.27, unit="Beckmann slope", low=0.02, high=1.0, source="chosen by eye"
+    )
+
+
+MATERIALS: dict[str, type[Material]] = {kind.kind: kind for kind in (Material, Skin)}
+
+
+def read_material(table: Mapping[str, Any], where: str) -> Material:
+    """A material from a table, by its `kind`."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} is {table!r:.60}; expected a table")
+    kind = table.get("kind", "plain")
+    if kind not in MATERIALS:
+        raise InputError(f"{where}.kind is {kind!r:.60}; expected one of {', '.join(MATERIALS)}")
+    return MATERIALS[kind].read({k: v for k, v in table.items() if k != "kind"}, where)

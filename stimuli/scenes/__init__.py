@@ -1,0 +1,165 @@
+"""Scenes: files of them, their named parts, patches, and the graph that the renderer draws.
+
+A scene file is TOML (thesis.toml is the one to copy). `rig` names a file of lights and an
+environment (stimuli/lights), `person` one of people (stimuli/people); what the scene itself says
+goes over what they say. A level of a study is a patch of the scene's table: `merge`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stimuli.errors import InputError
+
+if TYPE_CHECKING:
+    from renderer.scene import Scene
+    from renderer.scene.graph import SceneGraph
+
+ROOT = Path(__file__).resolve().parents[1]
+SCENES, LIGHTS, PEOPLE = ROOT / "scenes", ROOT / "lights", ROOT / "people"
+_FILES = (("environment", "map"),)
+_MATERIAL_FILES = ("albedo_map", "normal_map", "roughness_map")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A scene ready to be drawn, and what there is to say of it.
+
+    provenance: object -> where it came from; licences: of the data in it; notes: for the user.
+    """
+
+    graph: SceneGraph
+    provenance: dict[str, dict]
+    licences: list[dict]
+    notes: tuple[str, ...] = ()
+
+
+def names(folder: Path) -> list[str]:
+    """The parts that a folder offers by name."""
+    return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def load_table(name_or_path: str | Path, beside: Path | None = None) -> dict[str, Any]:
+    """The raw table of a scene: one of stimuli/scenes by its name, or a file.
+
+    beside: the folder that relative paths start from; files that the scene names are made absolute.
+    """
+    path = _part(name_or_path, SCENES, "scene", beside)
+    return _absolute(_read(path), path.parent)
+
+
+def merge(table: Mapping[str, Any], patch: Mapping[str, Any]) -> dict[str, Any]:
+    """`patch` over `table`: tables are merged, other values replace, false removes a table."""
+    result = dict(table)
+    for key, value in patch.items():
+        old = result.get(key)
+        if value is False and isinstance(old, Mapping):
+            del result[key]
+        elif isinstance(value, Mapping) and isinstance(old, Mapping):
+            result[key] = merge(old, value)
+        elif isinstance(value, Mapping):
+            result[key] = merge({}, value)
+        else:
+            result[key] = value
+    return result
+
+
+def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
+    """The table with its named parts put in: the rig's lights, the people's own skin.
+
+    An object that names no material has the one of its own name; a person's starts from their skin.
+    """
+    table = dict(table)
+    rig = table.pop("rig", None)
+    if rig is not None:
+        path = _part(rig, LIGHTS, f"{where}.rig")
+        table = merge(_absolute(_read(path), path.parent), table)
+    objects = table.get("objects", {})
+    if not isinstance(objects, Mapping):
+        raise InputError(f"{where}.objects is {objects!r:.60}; expected a table of named tables")
+    objects, materials = dict(objects), dict(table.get("materials", {}))
+    for name, entry in objects.items():
+        if not isinstance(entry, Mapping) or "material" in entry:
+            continue
+        own: dict[str, Any] = {}
+        if entry.get("shape") == "person":
+            person = entry.get("person", "man")
+            own = merge({"kind": "skin"}, person_table(person).get("skin", {}))
+        objects[name] = {**entry, "material": name}
+        materials[name] = merge(own, materials.get(name, {}))
+    return {**table, "objects": objects, "materials": materials}
+
+
+def read_scene(table: Mapping[str, Any], where: str = "scene") -> Scene:
+    """The checked scene of a table; InputError names the dotted key at fault."""
+    from renderer.scene import Scene
+
+    return Scene.read(complete(table, where), where)
+
+
+def person_table(name_or_path: str) -> dict[str, Any]:
+    """The table of a person: one of stimuli/people by name, or a file."""
+    return _read(_part(name_or_path, PEOPLE, "person"))
+
+
+def stage(scene: Scene, seed: int = 0) -> Stage:
+    """Objects, lights and environment of a scene in a graph; seed: of generated hair."""
+    from stimuli.scenes.staging import stage as put
+
+    return put(scene, seed)
+
+
+def _part(name: str | Path, folder: Path, what: str, beside: Path | None = None) -> Path:
+    """The file of a named part, or the file itself where the name is a path."""
+    if not isinstance(name, str | Path) or not str(name).strip():
+        raise InputError(f"{what} is {name!r:.60}; expected a name or a file")
+    path = Path(name)
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        found = path if beside is None or path.is_absolute() else beside / path
+        if not found.is_file():
+            raise InputError(f"{what} {str(found)!r}: no such file")
+        return found
+    known = names(folder)
+    if path.name not in known:
+        near = get_close_matches(path.name, known, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
+        raise InputError(f"no {what.rpartition('.')[2]} {path.name!r}; {hint}")
+    return folder / f"{path.name}.toml"
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError(f"{path}: line {line}: not UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not TOML: {error}") from error
+
+
+def _absolute(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The table with the files that it names made absolute, from `folder`."""
+    for holder, key in _file_keys(table):
+        value = holder[key]
+        if isinstance(value, str) and value and not Path(value).is_absolute():
+            holder[key] = str((folder / value).resolve())
+    return table
+
+
+def _file_keys(table: dict[str, Any]) -> Iterator[tuple[dict, str]]:
+    """Every (table, key) that holds a file's name."""
+    for part, key in _FILES:
+        if isinstance(table.get(part), dict) and key in table[part]:
+            yield table[part], key
+    for part, keys in (("objects", ("file",)), ("materials", _MATERIAL_FILES)):
+        entries = table.get(part)
+        for entry in entries.values() if isinstance(entries, dict) else ():
+            if isinstance(entry, dict):
+                yield from ((entry, key) for key in keys if key in entry)

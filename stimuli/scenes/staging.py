@@ -1,0 +1,137 @@
+"""From a scene's values to the renderer's graph: heads are built, meshes read, shapes generated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from renderer.scene import (
+    MASKS,
+    Material,
+    Model,
+    Proxy,
+    Scene,
+    Surface,
+    objects,
+    shapes,
+)
+from renderer.scene.graph import SceneGraph
+from stimuli.errors import InputError
+from stimuli.heads import load_head
+from stimuli.scenes import Stage
+
+MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+GENERATED = {"what": "generated shape", "licence": "MIT", "source": "subdermal"}
+
+
+def stage(scene: Scene, seed: int) -> Stage:
+    """See stimuli.scenes.stage."""
+    made = {name: _model(thing, scene, seed) for name, thing in scene.objects.items()}
+    subject = _subject(made[scene.subject][0], scene.objects[scene.subject].pose())
+    graph = SceneGraph(scene.environment, scene.picture, subject, scene.camera)
+    provenance, licences, notes = {}, [], []
+    for name, (model, origin, terms, remarks) in made.items():
+        graph.add_model(model, scene.objects[name].pose(), name)
+        provenance[name] = origin
+        licences += [entry for entry in terms if entry not in licences]
+        notes += remarks
+    for name, light in scene.lights.items():
+        graph.add_light(light, name)
+    return Stage(graph, provenance, licences, tuple(notes))
+
+
+def _subject(model: Model, pose: np.ndarray) -> np.ndarray:
+    """What cameras look at: a head's eyes, else the middle of an object (3,)."""
+    points = model.surface.positions
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return pose[:3, :3] @ model.landmarks.get("eyes", middle) + pose[:3, 3]
+
+
+def _model(thing: objects.Object, scene: Scene, seed: int):
+    """(model, provenance, licences, notes) of an object."""
+    material = scene.materials[thing.material]
+    if isinstance(thing, objects.Person | objects.Scan):
+        if isinstance(thing, objects.Person):
+            head = load_head(thing.person, seed=seed)
+        else:
+            head = load_head(thing.file, thing.unit, seed, thing.up)
+            own = head.model.surface.base_colour
+            if own is not None and material.albedo == Material().albedo:
+                material = replace(material, albedo=tuple(float(v) for v in own))
+        model = replace(head.model, material=material)
+        return model, head.provenance, head.licences, list(head.notes)
+    if isinstance(thing, objects.Mesh):
+        return _mesh(thing.file, thing.unit, thing.up, material), {"file": thing.file}, [], []
+    return _shape(_generated(thing, material), material), {"shape": thing.shape}, [GENERATED], []
+
+
+def _generated(thing: objects.Object, material: Material) -> shapes.Shape:
+    if isinstance(thing, objects.Sphere):
+        return shapes.sphere(thing.radius_mm)
+    if isinstance(thing, objects.Slab):
+        return shapes.slab(thing.size_mm)
+    if isinstance(thing, objects.Sheet):
+        return shapes.slab((*thing.size_mm, thing.thickness_mm))
+    if isinstance(thing, objects.Box):
+        return shapes.room(thing.size_mm, thing.left_albedo, thing.right_albedo, material.albedo)
+    raise TypeError(f"no shape for {type(thing).__name__}")
+
+
+def _shape(shape: shapes.Shape, material: Material) -> Model:
+    """A generated shape as a model; its own colours become an albedo map of one texel a face."""
+    count = len(shape.positions)
+    albedo = np.array(material.albedo) if shape.colours is None else shape.colours
+    proxy = Proxy.itself(shape.positions, shape.normals, shape.faces, albedo)
+    surface = Surface(
+        shape.positions.astype(np.float32),
+        shape.normals.astype(np.float32),
+        shape.uvs.astype(np.float32),
+        shape.faces.astype(np.uint32),
+        np.zeros((count, len(MASKS)), np.float32),
+        proxy,
+        albedo_map=None if shape.colours is None else _atlas(shape),
+        scatters=None if material.scatters else np.zeros(count),
+    )
+    return Model(surface, (), None, {}, material)
+
+
+def _atlas(shape: shapes.Shape, size: int = 96) -> np.ndarray:
+    """The shape's own colours over its atlas of 3 x 2 cells: (size, size, 3) uint8 sRGB."""
+    cell = np.floor(shape.uvs * [3, 2]).astype(int)
+    image = np.zeros((2, 3, 3))
+    image[1 - cell[:, 1], cell[:, 0]] = shape.colours
+    srgb = np.where(image <= 0.0031308, image * 12.92, 1.055 * image ** (1 / 2.4) - 0.055)
+    big = np.repeat(np.repeat(srgb, size // 2, axis=0), size // 3, axis=1)
+    return np.rint(255 * big).astype(np.uint8)
+
+
+@lru_cache(maxsize=4)
+def _mesh_arrays(file: str, unit: str, up: str) -> tuple[np.ndarray, ...]:
+    """positions (N, 3) mm centred on the origin, normals, uvs, faces of a mesh file."""
+    import trimesh
+
+    try:
+        loaded = trimesh.load(file, force="mesh", process=False)
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file; expected a mesh") from None
+    except Exception as error:  # trimesh raises whatever its readers raise
+        words = " ".join(str(error).split())[:120]
+        raise InputError(f"{file}: cannot be read as a mesh: {words}") from error
+    if not isinstance(loaded, trimesh.Trimesh) or not len(loaded.faces):
+        raise InputError(f"{file}: has no triangles; expected a mesh")
+    points = np.asarray(loaded.vertices, float) * MM[unit]
+    normals = np.asarray(loaded.vertex_normals, float)
+    if not np.isfinite(points).all():
+        raise InputError(f"{file}: has coordinates that are not numbers; mend it first")
+    if up == "z":
+        points, normals = points[:, [0, 2, 1]] * [1, 1, -1], normals[:, [0, 2, 1]] * [1, 1, -1]
+    points -= 0.5 * (points.min(axis=0) + points.max(axis=0))
+    uvs = getattr(loaded.visual, "uv", None)
+    uvs = np.zeros((len(points), 2)) if uvs is None else np.asarray(uvs, float)
+    return points, normals, uvs, np.asarray(loaded.faces)
+
+
+def _mesh(file: str, unit: str, up: str, material: Material) -> Model:
+    return _shape(shapes.Shape(*_mesh_arrays(file, unit, up)), material)

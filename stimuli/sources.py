@@ -1,0 +1,79 @@
+"""Which files shape an image: what is rendered anew when one of them changes.
+
+Python modules are followed by their imports; shaders that techniques share are all of
+renderer/passes and renderer/shaders, and a technique's own are those beside its module. So a
+comment in the study code, or in another technique, leaves an image as it is.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SHADERS = ("*.glsl", "*.vert", "*.frag", "*.geom")
+#: Where following starts for every image.
+SHARED = ("renderer.frame", "stimuli.scenes.staging")
+
+
+@lru_cache(maxsize=256)
+def _imports(path: Path) -> frozenset[str]:
+    """The dotted names that a file imports from the packages that draw."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return frozenset(n for n in names if n.split(".")[0] in ("renderer", "stimuli"))
+
+
+def _file(name: str) -> Path | None:
+    """The file of a dotted name, None where it names something inside a module."""
+    path = ROOT.joinpath(*name.split("."))
+    for found in (path.with_suffix(".py"), path / "__init__.py"):
+        if found.is_file():
+            return found
+    return None
+
+
+def modules(*names: str) -> set[Path]:
+    """The files of modules and of all that they import; the table of techniques is not followed."""
+    found: set[Path] = set()
+    waiting = list(names)
+    while waiting:
+        path = _file(waiting.pop())
+        if path is None or path in found or path == ROOT / "renderer/techniques/__init__.py":
+            continue
+        found.add(path)
+        waiting += _imports(path)
+    return found
+
+
+def shared() -> set[Path]:
+    """The files behind every image, whatever its technique."""
+    found = modules(*SHARED)
+    for folder in ("renderer/passes", "renderer/shaders"):
+        for pattern in SHADERS:
+            found.update((ROOT / folder).glob(pattern))
+    found.update(path for path in (ROOT / "stimuli/heads").rglob("*") if path.suffix == ".npz")
+    return found
+
+
+def of_technique(module: str) -> set[Path]:
+    """The files of a technique's module: what it imports, and the shaders named as its modules."""
+    found = modules(module)
+    beside = {path.stem for path in found if path.parent == ROOT / "renderer/techniques"}
+    folder = ROOT / "renderer/techniques"
+    return found | {p for pattern in SHADERS for p in folder.glob(pattern) if p.stem in beside}
+
+
+def digest(module: str) -> str:
+    """The sha256 of all that shapes an image of the technique in `module`."""
+    sha256 = hashlib.sha256()
+    for path in sorted(shared() | of_technique(module)):
+        sha256.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return sha256.hexdigest()
