@@ -12,7 +12,8 @@ The public face (numpy, pandas and scipy, no matplotlib):
         if not comparison.missing:
             print(framing, priorities(comparison.matrix))  # vector, lambda_max, ci, cr
 
-    results = everything(responses, Options(seed=1, margin=0.5))  # see analysis.compute
+    # every statistic, see analysis.compute
+    results = everything(responses, Options(seed=1, margin=0.5))
     results.tables["worths"], results.notes["worths"]  # numbers; what was refused and why
 
 `responses_from_records` takes mappings instead of a file. Errors of the user's making are

@@ -27,8 +27,9 @@ _ESCAPES = {
     "\N{PLUS-MINUS SIGN}": r"$\pm$",
 }
 
-PREAMBLE = r"""% Tables with booktabs. Compile this file alone, or \input the part between the
-% lines of '%' of one table.
+PREAMBLE = (
+    r"% Tables with booktabs. Compile this file alone, or \input the part between the lines"
+    r""" of '%' of one table.
 \documentclass[10pt]{article}
 \usepackage[T1]{fontenc}
 \usepackage[utf8]{inputenc}
@@ -39,6 +40,7 @@ PREAMBLE = r"""% Tables with booktabs. Compile this file alone, or \input the pa
 \setlength{\LTcapwidth}{\textwidth}
 \begin{document}
 """
+)
 
 
 def escape(text: str) -> str:

@@ -59,9 +59,8 @@ from app.commands.media import medium_options, stack_of, writable
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of montecarlo."
 )
 def command(models, out, totals, r_max, points, terms, parametrisation, photons, seed, **medium):
-    """Plot or tabulate MODEL...
-
-    for one medium: R_d(r) and T_d(r) in 1/mm^2, per unit of flux that has entered.
+    """Plot or tabulate MODEL... for one medium: R_d(r) and T_d(r) in 1/mm^2, per unit of flux that
+    has entered.
 
     Models: dipole, better_dipole, multipole, layered, quantized_diffusion, burley, gaussian_sum,
     montecarlo.
