@@ -29,6 +29,7 @@ class Codebook:
     """Order and labels of a study's framings and techniques; `order_rule` and `framing_rule` say
     where the orders come from.
 
+    factors: the columns of the levels that a study varies beside framing; images differ by them.
     factor: the column of the table that answers are grouped by. Where it is not 'framing',
     `framings` are its levels; see `by`.
     """
@@ -41,6 +42,7 @@ class Codebook:
     familiarity: tuple[str, ...] = FAMILIARITY
     title: str = ""
     factor: str = FRAMING
+    factors: tuple[str, ...] = ()
 
     @property
     def spoken(self) -> str:
@@ -69,6 +71,10 @@ class Codebook:
         '3 (familiarity)' for a number.
         """
         levels, spoken = tuple(levels), factor.replace("_", " ")
+        order = [level for key, level in self.labels if key == factor]
+        if set(levels) <= set(order):
+            levels = tuple(level for level in order if level in levels)
+            rule = self.framing_rule
         labels = {key: label for key, label in self.labels.items() if key[0] != "framing"}
         declared = {level: label for (key, level), label in self.labels.items() if key == factor}
         labels |= {
@@ -175,6 +181,7 @@ def read_manifest(path: str | Path) -> Codebook:
         labels={("framing", name): label for name, label in framings.items()}
         | {("technique", name): label for name, label in techniques.items()}
         | _further(study),
+        factors=tuple(factor["name"] for factor in study.get("factors") or []),
         familiarity=FAMILIARITY if levels is None else tuple(levels),
         title=str(study.get("title") or study.get("name") or ""),
     )

@@ -76,7 +76,8 @@ class Responses:
         familiarity     int8, 1 to 5
         framing         ordered category, in the order of the codebook; with another factor than
                         'framing', its level
-        image_framing   ordered category: the framing of the images, whatever the factor
+        image_framing   ordered category: the framing of the images, whatever the factor; with
+                        the levels of the study's further factors, joined by dots
         a, b            ordered categories: the pair, a before b in the order of techniques
         preference      int8, -2 to 2, oriented to the pair: negative prefers a, positive prefers b
         strength        int8, 0 to 2: |preference|
@@ -146,7 +147,8 @@ def read_responses(
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    raw, lines, findings = _parse(str(path), data, factor)
+    further = codebook.factors if codebook else ()
+    raw, lines, findings = _parse(str(path), data, factor, further)
     return _tidy(
         str(path), raw, lines, findings, codebook, order, factor, hashlib.sha256(data).hexdigest()
     )
@@ -169,7 +171,9 @@ def responses_from_records(
     if factor not in raw:
         raise InputError(_lacking(factor, raw))
     blank = raw[factor].isna() & (factor not in REQUIRED)
-    raw = raw[[name for name in dict.fromkeys((*REQUIRED, *OPTIONAL, factor)) if name in raw]]
+    further = codebook.factors if codebook else ()
+    wanted = dict.fromkeys((*REQUIRED, *OPTIONAL, factor, *further))
+    raw = raw[[name for name in wanted if name in raw]]
     raw = raw.map(lambda value: str(int(value)) if isinstance(value, bool) else str(value)).astype(
         object
     )
@@ -194,7 +198,9 @@ def _lacking(factor: str, columns: Iterable[str]) -> str:
     )
 
 
-def _parse(name: str, data: bytes, factor: str) -> tuple[pd.DataFrame, list[str], list[Finding]]:
+def _parse(
+    name: str, data: bytes, factor: str, further: tuple[str, ...] = ()
+) -> tuple[pd.DataFrame, list[str], list[Finding]]:
     """The cells as text, with line and last_line; the lines of the file; findings for rows without
     the header's fields.
     """
@@ -223,7 +229,9 @@ def _parse(name: str, data: bytes, factor: str) -> tuple[pd.DataFrame, list[str]
     if factor not in header:
         raise InputError(f"{name}: {_lacking(factor, header)}")
     wanted = [
-        column for column in dict.fromkeys((*REQUIRED, *OPTIONAL, factor)) if column in header
+        column
+        for column in dict.fromkeys((*REQUIRED, *OPTIONAL, factor, *further))
+        if column in header
     ]
     twice = [column for column in wanted if header.count(column) > 1]
     if twice:
@@ -284,8 +292,12 @@ def _tidy(
         _finding(raw.line[at], raw.last_line[at], "malformed", _some(reasons[at], 3, "; "), lines)
         for at in sorted(reasons)
     ]
+    raw["image"] = raw.framing
+    for column in codebook.factors if codebook else ():
+        if column in raw:
+            raw["image"] = raw.image + "." + raw[column]
     frame = (
-        raw[["participant", "framing", "left", "right", "line", "last_line"]]
+        raw[["participant", "framing", "image", "left", "right", "line", "last_line"]]
         .join(values)
         .drop(index=list(reasons))
     )
@@ -340,7 +352,9 @@ def _tidy(
         ]
         frame = frame[~again]
     frame = frame.drop(columns="last_line").reset_index(drop=True)
-    grouping = () if factor == FRAMING else tuple(_grouping(frame, codebook))
+    crossed = frame.image_framing.nunique() > frame.framing.nunique()
+    grouped = factor != FRAMING or crossed
+    grouping = tuple(_grouping(frame, codebook)) if grouped else ()
     return Responses(
         frame=frame,
         codebook=codebook,
@@ -390,11 +404,9 @@ def _levels(name: str, factor: str, level: pd.Series) -> tuple[list[str], str]:
 
 
 def _where(row: object, codebook: Codebook) -> str:
-    return (
-        row.framing
-        if codebook.factor == FRAMING
-        else f"{codebook.framing_label(row.framing)}, {row.image_framing}"
-    )
+    if codebook.factor == FRAMING:
+        return row.image_framing
+    return f"{codebook.framing_label(row.framing)}, {row.image_framing}"
 
 
 def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
@@ -409,10 +421,10 @@ def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
         )
         for row in held.itertuples()
     )
-    yield (
-        f"Answers are grouped by {codebook.spoken} ({sizes}); the column framing of every "
-        "table holds its levels."
+    holds = (
+        "" if codebook.factor == FRAMING else "; the column framing of every table holds its levels"
     )
+    yield f"Answers are grouped by {codebook.spoken} ({sizes}){holds}."
     if len(held) == 1:
         yield f"There is one {codebook.level}: nothing is compared over it."
     few = [codebook.framing_label(level) for level in held.index[held.people < FEWEST_PEOPLE]]
@@ -434,10 +446,11 @@ def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
             for name in frame.image_framing.cat.categories
             if (frame.image_framing == name).any()
         ]
+        pooled = "combinations of levels" if codebook.factors else "framings"
         yield (
             f"{'Every ' + codebook.level if len(where) == len(held) else _some(where)} pools "
-            f"framings ({_some(names)}). Answers of one "
-            "participant about one pair at several framings are repeated measures: tests "
+            f"{pooled} ({_some(names)}). Answers of one "
+            f"participant about one pair at several {pooled} are repeated measures: tests "
             "take the participant's mean, and intervals "
             "resample participants with all of their answers; counts, medians, worths and "
             "AHP take every answer."
@@ -539,7 +552,7 @@ def _oriented(frame: pd.DataFrame, codebook: Codebook) -> pd.DataFrame:
             "participant": frame.participant.astype("category"),
             "familiarity": frame.familiarity.astype(np.int8),
             "framing": pd.Categorical(frame.framing, codebook.framings, ordered=True),
-            "image_framing": pd.Categorical(frame.framing, codebook.framings, ordered=True),
+            "image_framing": pd.Categorical(frame.image, _images(frame, codebook), ordered=True),
             "a": pd.Categorical.from_codes(a, dtype=techniques),
             "b": pd.Categorical.from_codes(b, dtype=techniques),
             "preference": preference,
@@ -555,6 +568,14 @@ def _oriented(frame: pd.DataFrame, codebook: Codebook) -> pd.DataFrame:
         },
         index=frame.index,
     )
+
+
+def _images(frame: pd.DataFrame, codebook: Codebook) -> list[str]:
+    """The cells of a study in its order: framings, or these with the levels of further factors."""
+    if not codebook.factors:
+        return list(codebook.framings)
+    place = {framing: k for k, framing in enumerate(codebook.framings)}
+    return sorted(frame.image.unique(), key=lambda name: (place[name.split(".")[0]], name))
 
 
 def _notes(frame: pd.DataFrame, raw: pd.DataFrame, codebook: Codebook) -> Iterable[str]:

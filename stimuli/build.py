@@ -23,7 +23,7 @@ import numpy as np
 
 from stimuli import manifest, sources
 from stimuli.errors import InputError, Stopped
-from stimuli.scenes import PEOPLE
+from stimuli.parts import PEOPLE
 from stimuli.study import FRAMING, Cell, Study
 
 STATE = "build.json"

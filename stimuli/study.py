@@ -8,7 +8,6 @@ nothing here knows which techniques and framings there are: `stimuli.build` asks
 """
 
 import re
-import tomllib
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import product
@@ -16,6 +15,7 @@ from math import prod
 from pathlib import Path
 
 from stimuli.errors import InputError
+from stimuli.parts import read_toml
 from stimuli.scenes import load_table, merge
 from stimuli.table import Table, refuse_doubles
 
@@ -243,7 +243,7 @@ def load_study(path: str | Path) -> Study:
     A scene or a scan that is a file is looked for beside the study.
     """
     path = Path(path)
-    table = Table(_read_toml(path), str(path))
+    table = Table(read_toml(path), str(path))
     render, head = table.table("render", default={}), table.table("head", default={})
     width, height = _size(render)
     scene = load_table(table.text("scene", default="thesis"), path.parent)
@@ -398,22 +398,10 @@ def _consent(table: Table) -> str:
     return text
 
 
-def _read_toml(path: Path) -> dict:
-    try:
-        return tomllib.loads(path.read_bytes().decode())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}: line {line}: not UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not TOML: {error}") from error
-
-
 @cache
 def _defaults() -> dict:
     """The thesis's wording."""
-    thesis = _read_toml(THESIS)
+    thesis = read_toml(THESIS)
     return {key: thesis[key] for key in _WORDING}
 
 

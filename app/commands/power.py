@@ -187,13 +187,13 @@ def command(
     from analysis.report import write_files
     from analysis.responses import read_responses
 
-    framings = tuple(framing.name for framing in definition.framings)
+    cells = tuple(cell.name for cell in definition.cells)
     codebook = Codebook(
-        framings,
+        cells,
         techniques,
         "the study's",
         "the study's",
-        {("framing", framing.name): framing.label for framing in definition.framings}
+        {("framing", cell.name): definition.cell_label(cell) for cell in definition.cells}
         | {("technique", condition.name): condition.label for condition in definition.techniques},
         title=definition.title,
     )
@@ -226,7 +226,7 @@ def command(
         answers_each=answers,
         alpha=round(1 - definition.analysis.get("level", 0.95), 10) if alpha is None else alpha,
         power=wanted,
-        family=family or len(framings) * len(techniques) * (len(techniques) - 1) // 2,
+        family=family or definition.questions,
         most=most,
         studies=studies,
         seed=seed,

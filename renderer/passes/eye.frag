@@ -4,6 +4,7 @@
 #include "shaders/lighting.glsl"
 #include "passes/surface_out.glsl"
 uniform vec3 centre; uniform vec3 gaze; uniform float radius; uniform float iris_radius;
+uniform vec3 iris_base; uniform vec3 iris_fibres; uniform vec3 iris_collarette; uniform vec3 sclera_colour;
 
 void main() {
     vec3 n = normalize(world_normal);
@@ -27,14 +28,14 @@ void main() {
     fibre += 0.55 * noise(vec3(around * 13.0, r * 2.2)) + 0.35 * noise(vec3(around * 31.0, r * 3.5 + 4.0)) + 0.22 * noise(vec3(around * 60.0, r * 6.0));
     float pupil = 0.33;
     float collar = exp(-pow((r - 0.50 - 0.04 * noise(vec3(around * 5.0, 1.0))) / 0.11, 2.0));
-    vec3 iris_colour = mix(vec3(0.11, 0.145, 0.135), vec3(0.20, 0.215, 0.17), clamp(0.5 + 0.8 * fibre, 0.0, 1.0));
-    iris_colour = mix(iris_colour, vec3(0.26, 0.16, 0.065), 0.65 * collar);
+    vec3 iris_colour = mix(iris_base, iris_fibres, clamp(0.5 + 0.8 * fibre, 0.0, 1.0));
+    iris_colour = mix(iris_colour, iris_collarette, 0.65 * collar);
     iris_colour *= 1.0 - 0.20 * smoothstep(0.15, 0.85, noise(vec3(iris * 6.0, 3.0)));
     iris_colour *= mix(0.30, 1.0, smoothstep(1.02, 0.80, r));
     iris_colour *= smoothstep(pupil - 0.025, pupil + 0.035, r + 0.008 * noise(vec3(around * 8.0, 2.0)));
 
     // sclera: warm white, veins that fade towards the cornea
-    vec3 sclera = vec3(0.50, 0.445, 0.415) * (1.0 + 0.03 * noise(local / 2.5));
+    vec3 sclera = sclera_colour * (1.0 + 0.03 * noise(local / 2.5));
     vec3 q = local / vec3(1.0, 1.0, 1.4);
     float vein = 0.0;
     for (int k = 0; k < 2; ++k) {

@@ -122,6 +122,10 @@ class Surfaces:
                 "gaze": pose[:3, :3] @ eye.gaze / size,
                 "radius": eye.radius * size,
                 "iris_radius": eye.iris_radius * size,
+                "iris_base": eye.colours["iris"],
+                "iris_fibres": eye.colours["fibres"],
+                "iris_collarette": eye.colours["collarette"],
+                "sclera_colour": eye.colours["sclera"],
             }
             program.use(**program.accepts({**values, **own}))
             drawn.mesh.draw()
@@ -202,7 +206,10 @@ def _body(item: Item) -> Body:
     if hasattr(part, "proxy"):
         proxy = part.proxy
         positions, normals = _world(item, proxy.positions), _turned(item, proxy.normals)
-        return Body(positions, normals, proxy.faces, np.asarray(proxy.albedo))
+        albedo, value = proxy.albedo, part.material.value
+        if isinstance(value, Skin) and proxy.masks is not None:
+            albedo = value.mean_albedo(proxy.masks)
+        return Body(positions, normals, proxy.faces, np.asarray(albedo))
     positions, normals = _world(item, part.positions), _turned(item, part.normals)
     grey = np.full((len(positions), 3), 0.5)
     return Body(positions, normals, np.asarray(part.indices).reshape(-1, 3), grey)

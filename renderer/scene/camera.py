@@ -55,16 +55,21 @@ class Camera(Parameters):
             raise InputError(f"{where}.framing is {named!r:.60}; expected a name")
         start = FRAMINGS.get(named or "close-up")
         if start is None:
-            if not {"height_mm", "yaw_deg"} <= set(table):
+            if "height_mm" not in table or (angle is None and "yaw_deg" not in table):
                 raise InputError(
                     f"{where}.framing is {named!r}; expected one of {', '.join(FRAMINGS)}, "
-                    "or a name of your own with height_mm and yaw_deg"
+                    "or a name of your own with height_mm and yaw_deg (or angle)"
                 )
             start = cls(framing=named)
         values = start.plain()
         if angle is not None:
             if angle not in ANGLES:
                 raise InputError(f"{where}.angle is {angle!r}; expected one of {', '.join(ANGLES)}")
+            if "yaw_deg" in table:
+                raise InputError(
+                    f"{where} has both angle, {angle!r}, and yaw_deg, {table['yaw_deg']!r}; "
+                    "expected one of them"
+                )
             values["yaw_deg"] = ANGLES[angle]
         return super().read({**values, **table}, where)
 

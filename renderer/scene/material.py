@@ -6,10 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from renderer.errors import InputError
 from renderer.parameters import Parameters, parameter
 
+#: What a head's masks say, in the order of their columns: how much of each, in [0, 1].
+MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
 _SHARE = {"low": 0.0, "high": 1.0}
+# Means of the shader's noises, by integration: of a freckle's cell, of the positive part of four
+# octaves, of the dots below the surface.
+FRECKLE_AREA, MOTTLING_MEAN, DOTS_MEAN = 0.03, 0.09, 0.22
 
 
 @dataclass(frozen=True)
@@ -108,6 +115,32 @@ class Skin(Material):
     roughness_oily: float = parameter(
         0.27, unit="Beckmann slope", low=0.02, high=1.0, source="chosen by eye"
     )
+
+    def mean_albedo(self, masks: np.ndarray) -> np.ndarray:
+        """Linear albedo (N, 3) at the scale of bounced light, from masks (N, 8).
+
+        What `colour` of passes/skin.frag averages to where its noises are zero on average.
+        """
+        column = {name: masks[:, k : k + 1] for k, name in enumerate(MASKS)}
+        lips, flushed, hair, inside = (column[n] for n in ("lips", "flush", "hair", "inside"))
+        melanin = self.melanin + 0.05 * column["eyelid"]
+        melanin = melanin + self.freckles * self.freckle_share * FRECKLE_AREA * (1 - lips)
+        blood = self.blood + self.flush * flushed + 0.05 * column["eyelid"]
+        blood = blood + self.mottling * (0.05 + 0.13 * flushed) * MOTTLING_MEAN
+        depth = melanin * np.array(self.melanin_absorbance)
+        depth = depth + blood * np.array(self.blood_absorbance)
+        albedo = np.array(self.dermis) * np.exp(-depth)
+        share = 0.88 * _smoothstep(0.12, 0.85, lips)
+        albedo = albedo + share * (np.array(self.lip) - albedo)
+        rooted = 0.75 * np.clip(hair + 0.75 * self.beard * column["beard"], 0, 1)
+        albedo = albedo * (1 + self.scalp * hair * (np.array([0.42, 0.40, 0.40]) - 1))
+        albedo = albedo * (1 - rooted * np.array([0.20, 0.18, 0.15]) - 0.45 * DOTS_MEAN * rooted)
+        return albedo + inside * (np.array([0.30, 0.07, 0.06]) - albedo)
+
+
+def _smoothstep(low: float, high: float, x: np.ndarray) -> np.ndarray:
+    t = np.clip((x - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)
 
 
 MATERIALS: dict[str, type[Material]] = {kind.kind: kind for kind in (Material, Skin)}

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from renderer.scene import material
-from renderer.scene.material import Material
+from renderer.scene.material import MASKS, Material, Skin
+
+__all__ = ["MASKS", "Eye", "Model", "Proxy", "Strands", "Surface"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class Proxy:
     faces: np.ndarray
     albedo: np.ndarray
     to_full: object
+    masks: np.ndarray | None = None
 
     @classmethod
     def itself(cls, positions, normals, faces, albedo) -> Proxy:
@@ -62,13 +64,12 @@ class Proxy:
         return cls(np.asarray(positions, float), np.asarray(normals, float), faces, albedo, to_full)
 
 
-MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
-
-
 @dataclass(frozen=True)
 class Eye:
-    """An eyeball with its cornea: positions, normals (N, 3), faces (M, 3); centre, gaze (3,),
-    radius, iris_radius mm.
+    """An eyeball with its cornea.
+
+    positions, normals (N, 3), faces (M, 3); centre, gaze (3,), radius, iris_radius mm; colours:
+    linear albedo of iris, fibres, collarette and sclera.
     """
 
     positions: np.ndarray
@@ -78,6 +79,7 @@ class Eye:
     gaze: np.ndarray
     radius: float
     iris_radius: float
+    colours: dict[str, tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
@@ -104,4 +106,4 @@ class Model:
     eyes: tuple[Eye, ...]
     strands: Strands | None
     landmarks: dict[str, np.ndarray]
-    material: Material = field(default_factory=material.Skin)
+    material: Material = field(default_factory=Skin)

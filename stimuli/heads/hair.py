@@ -11,10 +11,10 @@ import trimesh
 
 from renderer.scene import MASKS, Strands
 from stimuli.heads.mpfb import Anatomy
+from stimuli.heads.person import Hair
 from stimuli.heads.skin import azimuth, smoothstep
 
 POINTS = 7
-BROWN = np.array([0.055, 0.032, 0.019])  # linear albedo of the fibre, dark brown
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,9 @@ def _pack(points, width, colour, cover, vertex) -> dict:
     }
 
 
-def scalp_hair(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int) -> dict:
+def scalp_hair(
+    scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int, own: Hair
+) -> dict:
     """A short cut: longer and combed forward on top, fading towards the neck and the ears."""
     roots = scatter_roots(scalp, scalp.column("hair") ** 1.5, count, rng)
     p, n = roots.points, roots.normals
@@ -146,7 +148,7 @@ def scalp_hair(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: 
         n,
     )
     hair = roots.at(scalp.column("hair"))
-    length = (
+    length = own.scalp_length * (
         (4.5 + 8.0 * smoothstep(-60, 60, up) + 16.0 * on_top)
         * (0.75 + 0.25 * hair)
         * rng.uniform(0.7, 1.1, count)
@@ -162,7 +164,7 @@ def scalp_hair(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: 
     return _pack(
         points,
         np.full(count, 0.095) * (0.6 + 0.4 * hair),
-        BROWN * tone * (1 + 0.25 * _noise(p, 12, 5)[:, :1]),
+        np.array(own.colour) * tone * (1 + 0.25 * _noise(p, 12, 5)[:, :1]),
         cover,
         roots.vertex,
     )
@@ -194,7 +196,7 @@ class Projector:
         return _roots(self._scalp, corners, np.clip(weights, 0, 1))
 
 
-def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int = 800) -> list[dict]:
+def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: Hair) -> list[dict]:
     """Each brow follows an arc over its eye; hairs rise at the nose and turn outwards."""
     project, out = Projector(scalp), []
     for centre in eye_centres:
@@ -206,7 +208,8 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int = 800)
             + 7.4 * np.sin(np.pi * np.clip(0.06 + 0.80 * u, 0, 1))
             - 5.0 * smoothstep(0.74, 1.0, u)
         )
-        half = 4.0 * (1 - 0.72 * smoothstep(0.35, 1.0, u)) * smoothstep(-0.12, 0.22, u)
+        half = own.brow_width * 4.0 * (1 - 0.72 * smoothstep(0.35, 1.0, u))
+        half = half * smoothstep(-0.12, 0.22, u)
         v = np.clip(rng.normal(size=count) * 0.52, -1, 1)
         roots = project.roots(np.column_stack([centre[0] + side * x, centre[1] + arc + half * v]))
         tilt = (
@@ -235,7 +238,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int = 800)
             _pack(
                 points,
                 rng.uniform(0.045, 0.075, count),
-                BROWN * 1.6 * np.exp(0.25 * rng.normal(size=(count, 1))),
+                np.array(own.colour) * 1.6 * np.exp(0.25 * rng.normal(size=(count, 1))),
                 np.full((count, POINTS), 0.25),
                 roots.vertex,
             )
@@ -243,7 +246,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int = 800)
     return out
 
 
-def lashes(anatomy: Anatomy, scalp: Scalp, rng: np.random.Generator) -> list[dict]:
+def lashes(anatomy: Anatomy, scalp: Scalp, rng: np.random.Generator, own: Hair) -> list[dict]:
     """Upper and lower lashes along the lid margins, which the base mesh's lash helpers mark."""
     from scipy.spatial import cKDTree
 
@@ -269,8 +272,10 @@ def lashes(anatomy: Anatomy, scalp: Scalp, rng: np.random.Generator) -> list[dic
             ]
         )
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        length = (rng.uniform(5.5, 8.5, count) if upper else rng.uniform(3.0, 5.0, count)) * (
-            0.75 + 0.25 * (x * side - low) / (high - low)
+        length = (
+            own.lashes
+            * (rng.uniform(5.5, 8.5, count) if upper else rng.uniform(3.0, 5.0, count))
+            * (0.75 + 0.25 * (x * side - low) / (high - low))
         )
         s = np.linspace(0, 1, POINTS)
         curl = np.array([0, 1.0 if upper else -0.35, 0.0])
@@ -282,7 +287,7 @@ def lashes(anatomy: Anatomy, scalp: Scalp, rng: np.random.Generator) -> list[dic
             _pack(
                 points,
                 np.full(count, 0.060 if upper else 0.045),
-                np.tile(BROWN * 0.7, (count, 1)),
+                np.tile(np.array(own.colour) * 0.7, (count, 1)),
                 np.full((count, POINTS), 0.2),
                 tree.query(at)[1],
             )
@@ -290,7 +295,7 @@ def lashes(anatomy: Anatomy, scalp: Scalp, rng: np.random.Generator) -> list[dic
     return out
 
 
-def stubble(scalp: Scalp, rng: np.random.Generator, count: int) -> dict:
+def stubble(scalp: Scalp, rng: np.random.Generator, count: int, own: Hair) -> dict:
     """A day's beard."""
     roots = scatter_roots(scalp, scalp.column("beard") ** 1.3, count, rng)
     flow = _tangential(
@@ -304,13 +309,13 @@ def stubble(scalp: Scalp, rng: np.random.Generator, count: int) -> dict:
     return _pack(
         points,
         rng.uniform(0.05, 0.08, count),
-        BROWN * 1.3 * np.exp(0.3 * rng.normal(size=(count, 1))),
+        np.array(own.colour) * 1.3 * np.exp(0.3 * rng.normal(size=(count, 1))),
         np.zeros((count, POINTS)),
         roots.vertex,
     )
 
 
-def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int) -> dict:
+def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int, own: Hair) -> dict:
     """Fine pale hair on the cheeks, the ears and the forehead: seen against the light."""
     p = scalp.positions
     density = (
@@ -337,28 +342,28 @@ def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int)
     return _pack(
         points,
         np.full(count, 0.009),
-        np.tile([0.22, 0.15, 0.10], (count, 1)),
+        np.tile(own.vellus_colour, (count, 1)),
         np.zeros((count, POINTS)),
         roots.vertex,
     )
 
 
-def all_strands(anatomy: Anatomy, scalp: Scalp, seed: int, share: float = 1.0) -> Strands:
+def all_strands(
+    anatomy: Anatomy, scalp: Scalp, seed: int, share: float = 1.0, own: Hair | None = None
+) -> Strands:
     """Every strand of the head; share scales the numbers (tests use few)."""
+    own = own or Hair()
     rng = np.random.default_rng([seed, 11])
     eyes = anatomy.landmarks["eyes"]
+    balls = [ball.centre for ball in anatomy.eyes]
     parts = [
-        scalp_hair(scalp, eyes, rng, int(78000 * share)),
-        *brows(scalp, [e.centre for e in anatomy.eyes], rng, int(820 * share)),
-        *lashes(anatomy, scalp, rng),
-        stubble(scalp, rng, int(9000 * share)),
-        vellus(scalp, eyes, rng, int(16000 * share)),
+        scalp_hair(scalp, eyes, rng, int(own.scalp * share), own),
+        *brows(scalp, balls, rng, int(own.brows * share), own),
+        *(lashes(anatomy, scalp, rng, own) if own.lashes else ()),
+        stubble(scalp, rng, int(own.stubble * share), own),
+        vellus(scalp, eyes, rng, int(own.vellus * share), own),
     ]
+    kinds = {key: np.int64 if key == "root_vertex" else np.float32 for key in parts[0]}
     return Strands(
-        **{
-            key: np.concatenate([part[key] for part in parts]).astype(
-                np.float32 if key != "root_vertex" else np.int64
-            )
-            for key in parts[0]
-        }
+        **{key: np.concatenate([p[key].astype(kind) for p in parts]) for key, kind in kinds.items()}
     )

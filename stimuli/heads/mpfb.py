@@ -10,63 +10,18 @@ from __future__ import annotations
 import gzip
 import json
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from stimuli.errors import InputError
 from stimuli.heads import subdivide
+from stimuli.heads.person import Person
 
 MM_PER_UNIT = 100.0
 
-# The character: a man of about forty. Names are paths below `targets/`, values are weights in [0,
-# 1].
-CHARACTER: dict[str, float] = {
-    "macrodetails/caucasian-male-young": 0.62,
-    "macrodetails/caucasian-male-old": 0.23,
-    "macrodetails/african-male-young": 0.08,
-    "macrodetails/asian-male-young": 0.07,
-    "macrodetails/universal-male-young-averagemuscle-averageweight": 0.77,
-    "macrodetails/universal-male-old-averagemuscle-averageweight": 0.23,
-    "eyes/l-eye-scale-decr": 0.42,
-    "eyes/r-eye-scale-decr": 0.42,
-    "eyes/l-eye-height2-incr": 0.30,
-    "eyes/r-eye-height2-incr": 0.34,
-    "eyes/l-eye-bag-incr": 0.35,
-    "eyes/r-eye-bag-incr": 0.40,
-    "eyes/l-eye-eyefold-up": 0.12,
-    "eyes/r-eye-eyefold-up": 0.15,
-    "head/head-oval": 0.25,
-    "head/head-fat-decr": 0.10,
-    "head/head-back-scale-depth-incr": 0.15,
-    "nose/nose-hump-incr": 0.22,
-    "nose/nose-point-down": 0.10,
-    "nose/nose-width2-incr": 0.15,
-    "nose/nose-nostrils-width-incr": 0.15,
-    "mouth/mouth-cupidsbow-incr": 0.30,
-    "mouth/mouth-philtrum-volume-incr": 0.35,
-    "mouth/mouth-laugh-lines-in": 0.08,
-    "mouth/mouth-lowerlip-volume-incr": 0.15,
-    "chin/chin-cleft-incr": 0.10,
-    "chin/chin-bones-incr": 0.20,
-    "chin/chin-prominent-incr": 0.15,
-    "cheek/l-cheek-bones-incr": 0.30,
-    "cheek/r-cheek-bones-incr": 0.25,
-    "cheek/l-cheek-inner-decr": 0.10,
-    "forehead/forehead-temple-incr": 0.10,
-    "ears/l-ear-wing-incr": 0.15,
-    "ears/r-ear-wing-incr": 0.10,
-    "asym/asym-brown-1-l": 0.25,
-    "asym/asym-eye-4-l": 0.15,
-    "asym/asym-nose-1-r": 0.15,
-    "asym/asym-mouth-1-l": 0.20,
-    "asym/asym-jaw-1-r": 0.25,
-    "asym/asym-ear-1-l": 0.2,
-    "expression/units/caucasian/mouth-compression": 0.12,
-    "expression/units/caucasian/eye-left-opened-up": 0.45,
-    "expression/units/caucasian/eye-right-opened-up": 0.42,
-}
-ARM_DROP_DEG = 32.0
 LEVELS = 2
 CROP_BELOW_CROWN_MM = 520.0
 
@@ -110,11 +65,21 @@ def read_base(data: Path) -> Base:
     return Base(np.array(positions), np.array(uvs), np.array(quads), np.array(uv_quads), groups)
 
 
+def _targets(data: Path) -> list[Path]:
+    return sorted((data / "targets").rglob("*.target.gz"))
+
+
 def morph(data: Path, positions: np.ndarray, weights: dict[str, float]) -> np.ndarray:
     """Add weighted targets (`index dx dy dz` a line, in units) to positions (V, 3)."""
     result = positions.copy()
     for name, weight in weights.items():
-        with gzip.open(data / "targets" / f"{name}.target.gz", "rt", encoding="utf-8") as lines:
+        file = data / "targets" / f"{name}.target.gz"
+        if not file.is_file():
+            known = (p.relative_to(data / "targets").as_posix() for p in _targets(data))
+            near = get_close_matches(name, [k.removesuffix(".target.gz") for k in known], 1)
+            hint = f"did you mean {near[0]!r}?" if near else "expected one below targets/"
+            raise InputError(f"targets: no morph target {name!r}; {hint}")
+        with gzip.open(file, "rt", encoding="utf-8") as lines:
             rows = [line.split() for line in lines if line.strip() and not line.startswith("#")]
         if not rows:
             continue  # some macro targets are empty by design: the base mesh is their shape
@@ -231,11 +196,11 @@ def _sample_masks(
     return masks
 
 
-def build_anatomy(data: Path, levels: int = LEVELS) -> Anatomy:
+def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     """Morph, pose, crop and subdivide the base mesh."""
     base = read_base(data)
-    shaped = morph(data, base.positions, CHARACTER)
-    shaped = lower_arms(data, base, shaped, ARM_DROP_DEG) * MM_PER_UNIT
+    shaped = morph(data, base.positions, person.targets)
+    shaped = lower_arms(data, base, shaped, person.arm_drop_deg) * MM_PER_UNIT
 
     crown = shaped[base.quads.ravel(), 1].max()
     eyes, eye_vertices = [], ("helper-l-eye", "helper-r-eye")

@@ -79,7 +79,7 @@ def azimuth(p: np.ndarray) -> np.ndarray:
     return np.degrees(np.arctan2(np.abs(p[:, 0]), p[:, 2] - HEAD_AXIS_Z))
 
 
-def masks(anatomy: Anatomy, bust: Bust) -> np.ndarray:
+def masks(anatomy: Anatomy, bust: Bust, hairline_mm: float = 0.0) -> np.ndarray:
     """(N, len(MASKS)) float32 in [0, 1]."""
     p, own, mark = bust.positions, bust.masks, anatomy.landmarks
     eyes, nose, mouth = mark["eyes"], mark["nose"], mark["mouth"]
@@ -92,6 +92,7 @@ def masks(anatomy: Anatomy, bust: Bust) -> np.ndarray:
     wob = _wobble(p, 9.0)
     off_ear = 1 - smoothstep(0.15, 0.6, own["ears"])
     line = np.interp(around, HAIRLINE[:, 0], HAIRLINE[:, 1])
+    line = line - hairline_mm * smoothstep(60, 30, around)
     hair = smoothstep(-5.0, 7.0, up - line + 2.8 * wob) * off_ear
     top = np.interp(around, BEARD_TOP[:, 0], BEARD_TOP[:, 1])
     bottom = np.interp(around, BEARD_BOTTOM[:, 0], BEARD_BOTTOM[:, 1])
@@ -156,14 +157,3 @@ def masks(anatomy: Anatomy, bust: Bust) -> np.ndarray:
         "inside": inside,
     }
     return np.clip(np.column_stack([columns[name] for name in MASKS]), 0, 1).astype(np.float32)
-
-
-def mean_albedo(mask: np.ndarray) -> np.ndarray:
-    """Linear albedo (N, 3) at the scale of bounced light, from masks (N, len(MASKS)): what the
-    shader's colour averages to.
-    """
-    column = {name: mask[:, k : k + 1] for k, name in enumerate(MASKS)}
-    albedo = np.array([0.66, 0.42, 0.33]) * (1 - column["flush"] * [0.03, 0.22, 0.18])
-    albedo = albedo * (1 - column["lips"]) + column["lips"] * np.array([0.50, 0.22, 0.20])
-    albedo = albedo * (1 - 0.75 * column["hair"]) * (1 - 0.30 * column["beard"])
-    return albedo * (1 - column["inside"]) + column["inside"] * np.array([0.25, 0.06, 0.05])

@@ -7,21 +7,18 @@ goes over what they say. A level of a study is a patch of the scene's table: `me
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stimuli.errors import InputError
+from stimuli.parts import LIGHTS, PEOPLE, SCENES, part, read_toml
 
 if TYPE_CHECKING:
     from renderer.scene import Scene
     from renderer.scene.graph import SceneGraph
 
-ROOT = Path(__file__).resolve().parents[1]
-SCENES, LIGHTS, PEOPLE = ROOT / "scenes", ROOT / "lights", ROOT / "people"
 _FILES = (("environment", "map"),)
 _MATERIAL_FILES = ("albedo_map", "normal_map", "roughness_map")
 
@@ -39,18 +36,13 @@ class Stage:
     notes: tuple[str, ...] = ()
 
 
-def names(folder: Path) -> list[str]:
-    """The parts that a folder offers by name."""
-    return sorted(path.stem for path in folder.glob("*.toml"))
-
-
 def load_table(name_or_path: str | Path, beside: Path | None = None) -> dict[str, Any]:
     """The raw table of a scene: one of stimuli/scenes by its name, or a file.
 
     beside: the folder that relative paths start from; files that the scene names are made absolute.
     """
-    path = _part(name_or_path, SCENES, "scene", beside)
-    return _absolute(_read(path), path.parent)
+    path = part(name_or_path, SCENES, "scene", beside)
+    return _absolute(read_toml(path), path.parent)
 
 
 def merge(table: Mapping[str, Any], patch: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,8 +69,8 @@ def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
     table = dict(table)
     rig = table.pop("rig", None)
     if rig is not None:
-        path = _part(rig, LIGHTS, f"{where}.rig")
-        table = merge(_absolute(_read(path), path.parent), table)
+        path = part(rig, LIGHTS, f"{where}.rig")
+        table = merge(_absolute(read_toml(path), path.parent), table)
     objects = table.get("objects", {})
     if not isinstance(objects, Mapping):
         raise InputError(f"{where}.objects is {objects!r:.60}; expected a table of named tables")
@@ -104,7 +96,7 @@ def read_scene(table: Mapping[str, Any], where: str = "scene") -> Scene:
 
 def person_table(name_or_path: str) -> dict[str, Any]:
     """The table of a person: one of stimuli/people by name, or a file."""
-    return _read(_part(name_or_path, PEOPLE, "person"))
+    return read_toml(part(name_or_path, PEOPLE, "person"))
 
 
 def stage(scene: Scene, seed: int = 0) -> Stage:
@@ -112,36 +104,6 @@ def stage(scene: Scene, seed: int = 0) -> Stage:
     from stimuli.scenes.staging import stage as put
 
     return put(scene, seed)
-
-
-def _part(name: str | Path, folder: Path, what: str, beside: Path | None = None) -> Path:
-    """The file of a named part, or the file itself where the name is a path."""
-    if not isinstance(name, str | Path) or not str(name).strip():
-        raise InputError(f"{what} is {name!r:.60}; expected a name or a file")
-    path = Path(name)
-    if path.suffix == ".toml" or len(path.parts) > 1:
-        found = path if beside is None or path.is_absolute() else beside / path
-        if not found.is_file():
-            raise InputError(f"{what} {str(found)!r}: no such file")
-        return found
-    known = names(folder)
-    if path.name not in known:
-        near = get_close_matches(path.name, known, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
-        raise InputError(f"no {what.rpartition('.')[2]} {path.name!r}; {hint}")
-    return folder / f"{path.name}.toml"
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}: line {line}: not UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not TOML: {error}") from error
 
 
 def _absolute(table: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -155,11 +117,11 @@ def _absolute(table: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 def _file_keys(table: dict[str, Any]) -> Iterator[tuple[dict, str]]:
     """Every (table, key) that holds a file's name."""
-    for part, key in _FILES:
-        if isinstance(table.get(part), dict) and key in table[part]:
-            yield table[part], key
-    for part, keys in (("objects", ("file",)), ("materials", _MATERIAL_FILES)):
-        entries = table.get(part)
+    for section, key in _FILES:
+        if isinstance(table.get(section), dict) and key in table[section]:
+            yield table[section], key
+    for section, keys in (("objects", ("file",)), ("materials", _MATERIAL_FILES)):
+        entries = table.get(section)
         for entry in entries.values() if isinstance(entries, dict) else ():
             if isinstance(entry, dict):
                 yield from ((entry, key) for key in keys if key in entry)

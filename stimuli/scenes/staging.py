@@ -19,7 +19,7 @@ from renderer.scene import (
 )
 from renderer.scene.graph import SceneGraph
 from stimuli.errors import InputError
-from stimuli.heads import load_head
+from stimuli.heads import load_person, load_scan
 from stimuli.scenes import Stage
 
 MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -54,9 +54,9 @@ def _model(thing: objects.Object, scene: Scene, seed: int):
     material = scene.materials[thing.material]
     if isinstance(thing, objects.Person | objects.Scan):
         if isinstance(thing, objects.Person):
-            head = load_head(thing.person, seed=seed)
+            head = load_person(thing.person, seed)
         else:
-            head = load_head(thing.file, thing.unit, seed, thing.up)
+            head = load_scan(thing.file, thing.unit, thing.up)
             own = head.model.surface.base_colour
             if own is not None and material.albedo == Material().albedo:
                 material = replace(material, albedo=tuple(float(v) for v in own))

@@ -7,12 +7,17 @@ import renderer
 from renderer.scene import MASKS, Environment
 from renderer.scene.graph import SceneGraph
 from stimuli.heads import fetch, mpfb, subdivide
-from stimuli.heads.model import default_model, scan_model
+from stimuli.heads.default_head import default_model
+from stimuli.heads.person import Person
+from stimuli.heads.scan_model import scan_model
+from stimuli.parts import PEOPLE, read_toml
+
+MAN = Person.read(read_toml(PEOPLE / "man.toml"), "man")
 
 
 @pytest.fixture(scope="module")
 def anatomy():
-    return mpfb.build_anatomy(fetch.mpfb_data())
+    return mpfb.build_anatomy(fetch.mpfb_data(), MAN)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +164,7 @@ def test_an_uncoloured_scan_gets_eyes_and_loses_cards_and_shells(tmp_path):
 def test_a_large_scan_is_baked_on_a_cluster(monkeypatch, tmp_path):
     import trimesh
 
-    from stimuli.heads import model as module
+    from stimuli.heads import scan_model as module
     from stimuli.heads.scan import read_scan
 
     ball = trimesh.creation.icosphere(5, 120.0)

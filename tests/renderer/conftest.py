@@ -8,7 +8,9 @@ from renderer import gl
 from renderer.scene.graph import SceneGraph
 from stimuli import scenes
 from stimuli.heads import fetch, mpfb
-from stimuli.heads.model import default_model
+from stimuli.heads.default_head import default_model
+from stimuli.heads.person import Person
+from stimuli.parts import PEOPLE, read_toml
 
 SIZE = (320, 180)
 
@@ -24,6 +26,9 @@ def studio(model, **patch):
     return graph
 
 
+MAN = Person.read(read_toml(PEOPLE / "man.toml"), "man")
+
+
 @pytest.fixture(scope="session")
 def stand():
     """stand(model, **patch) -> graph: the model in the studio."""
@@ -32,7 +37,7 @@ def stand():
 
 @pytest.fixture(scope="session")
 def anatomy():
-    return mpfb.build_anatomy(fetch.mpfb_data())
+    return mpfb.build_anatomy(fetch.mpfb_data(), MAN)
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""From anatomy to the renderer's model: the default head, and a user's scan."""
+"""From a user's scan to the renderer's model."""
 
 from __future__ import annotations
 
@@ -6,54 +6,8 @@ import numpy as np
 from scipy import sparse
 
 from renderer.scene import MASKS, Material, Model, Proxy, Surface
-from stimuli.heads import eyes, hair, skin
-from stimuli.heads.mpfb import Anatomy, Bust, Eyeball
-from stimuli.heads.subdivide import triangles
-
-
-def _split(bust: Bust) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices split along UV seams: index of the position (N,), of the uv (N,), and triangles (M,
-    3) into them.
-    """
-    pairs = np.stack([triangles(bust.quads).ravel(), triangles(bust.uv_quads).ravel()], axis=1)
-    unique, index = np.unique(pairs, axis=0, return_inverse=True)
-    return unique[:, 0], unique[:, 1], index.reshape(-1, 3)
-
-
-def default_model(anatomy: Anatomy, seed: int, hair_share: float = 1.0) -> Model:
-    """The bust with skin, eyes and hair."""
-    fine, coarse = anatomy.levels[-1], anatomy.levels[1]
-    mask = skin.masks(anatomy, fine)
-    where, uv, faces = _split(fine)
-    coarse_mask = skin.masks(anatomy, coarse)
-    proxy_faces = triangles(coarse.quads)
-    pick = sparse.csr_matrix(
-        (np.ones(len(where)), (np.arange(len(where)), where)), (len(where), len(fine.positions))
-    )
-    proxy = Proxy(
-        coarse.positions,
-        coarse.normals,
-        proxy_faces,
-        skin.mean_albedo(coarse_mask),
-        (pick @ anatomy.to_fine).tocsr(),
-    )
-    surface = Surface(
-        fine.positions[where].astype(np.float32),
-        fine.normals[where].astype(np.float32),
-        fine.uvs[uv].astype(np.float32),
-        faces.astype(np.uint32),
-        mask[where],
-        proxy,
-    )
-    scalp = hair.Scalp(fine.positions[where], fine.normals[where], faces, mask[where])
-    landmarks = dict(anatomy.landmarks, eye_l=anatomy.eyes[0].centre, eye_r=anatomy.eyes[1].centre)
-    return Model(
-        surface,
-        tuple(eyes.eyeball(ball) for ball in anatomy.eyes),
-        hair.all_strands(anatomy, scalp, seed, hair_share),
-        landmarks,
-    )
-
+from stimuli.heads import eyes
+from stimuli.heads.mpfb import Eyeball
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
 CLUSTER_MM = 3.0

@@ -1,0 +1,48 @@
+"""Named parts of scenes and studies: TOML files in folders of this package, or a user's own."""
+
+from __future__ import annotations
+
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from stimuli.errors import InputError
+
+ROOT = Path(__file__).resolve().parent
+SCENES, LIGHTS, PEOPLE = ROOT / "scenes", ROOT / "lights", ROOT / "people"
+
+
+def names(folder: Path) -> list[str]:
+    """The parts that a folder offers by name."""
+    return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def part(name: str | Path, folder: Path, what: str, beside: Path | None = None) -> Path:
+    """The file of a named part, or the file itself where the name is a path."""
+    if not isinstance(name, str | Path) or not str(name).strip():
+        raise InputError(f"{what} is {name!r:.60}; expected a name or a file")
+    path = Path(name)
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        found = path if beside is None or path.is_absolute() else beside / path
+        if not found.is_file():
+            raise InputError(f"{what} {str(found)!r}: no such file")
+        return found
+    known = names(folder)
+    if path.name not in known:
+        near = get_close_matches(path.name, known, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
+        raise InputError(f"no {what.rpartition('.')[2]} {path.name!r}; {hint}")
+    return folder / f"{path.name}.toml"
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError(f"{path}: line {line}: not UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not TOML: {error}") from error
