@@ -17,9 +17,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from tqdm import tqdm
 
-from renderer.profiles import burley, chandrasekhar
-from renderer.profiles.dipole import grosjean_D
-from renderer.profiles.montecarlo import half_space
+from renderer.optics import burley, chandrasekhar
+from renderer.optics.dipole import grosjean_D
+from renderer.optics.montecarlo import half_space
 
 PUBLISHED = {
     "mfp": (4.9, 5.5),

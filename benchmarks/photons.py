@@ -21,7 +21,7 @@ from pathlib import Path
 import numba
 import numpy as np
 
-from renderer.profiles.montecarlo import Layer, Result, simulate
+from renderer.optics.montecarlo import Layer, Result, simulate
 
 ROUNDS = 5
 FLAGS = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math"]
@@ -213,7 +213,7 @@ def memory() -> None:
     """Peak memory of a process of its own for each number of photons."""
     print("\nphotons      peak memory MB")
     program = (
-        "import sys, resource; from renderer.profiles.montecarlo import *; "
+        "import sys, resource; from renderer.optics.montecarlo import *; "
         "simulate([Layer(1.5, 1, 9)], int(sys.argv[1]), cache=False); "
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
     )

@@ -21,7 +21,8 @@ from renderer.scene import graph as graphs
 from renderer.scene.camera import Camera
 from renderer.scene.picture import Picture
 from renderer.scene.view import View, main_camera, resolve
-from renderer.techniques.base import Inputs, Technique, output_formats
+from renderer.techniques.base import Inputs, Technique
+from renderer.techniques.screen import output_formats
 
 SHADOW_MAP = 4096
 SIZE_LIMIT = 8192  # pixels of a side after supersampling
@@ -270,6 +271,7 @@ class Frame:
             self.height,
             self.view.pixels_per_mm,
             r.supersample,
+            r.surfaces.curve(medium),
         )
 
     def scatter(self, technique: Technique) -> gl.Target:

@@ -74,7 +74,7 @@ def test_imports(path):
             | ({"renderer", "stimuli.scenes"} if relative.stem == "render" else set())
         )
         allowed |= (
-            {"renderer.errors", "renderer.medium", "renderer.profiles"}
+            {"renderer.errors", "renderer.optics.medium", "renderer.optics"}
             if relative.stem in PROFILE_VERBS
             else set()
         )
@@ -109,15 +109,15 @@ def test_application_never_imports_opengl():
 
 def test_profiles_never_import_opengl():
     names = [
-        f"renderer.profiles.{path.stem}"
-        for path in sorted((ROOT / "renderer/profiles").glob("[!_]*.py"))
+        f"renderer.optics.{path.stem}"
+        for path in sorted((ROOT / "renderer/optics").glob("[!_]*.py"))
     ]
     program = (
         "import sys, importlib\nfor name in sys.argv[1:]: "
         "importlib.import_module(name)\nprint(*sys.modules)"
     )
     run = subprocess.run(
-        [sys.executable, "-c", program, "renderer.medium", *names],
+        [sys.executable, "-c", program, "renderer.optics.medium", *names],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -74,8 +74,9 @@ def command(kind, model, skin, terms, free, method, k, taps, reach, out, **mediu
     import numpy as np
 
     from renderer.errors import InputError
-    from renderer.profiles import figures, gaussians, models, separable
-    from renderer.profiles.table import CHANNELS
+    from renderer.optics import figures, gaussians, models, separable
+    from renderer.optics.medium import fit_radii
+    from renderer.optics.table import CHANNELS
 
     if out:
         writable(out, (".json",))
@@ -96,7 +97,7 @@ def command(kind, model, skin, terms, free, method, k, taps, reach, out, **mediu
         name, total, radius = (
             f"{model} of {stack.name}",
             profile.totals()[0],
-            lambda c: models.fit_radii(stack, c),
+            lambda c: fit_radii(stack, c),
         )
         of_channel = lambda c: lambda r: profile.reflectance(np.maximum(r, 1e-6))[:, c]
         far = reach or figures.shown_reach(profile)

@@ -45,8 +45,8 @@ def command(media, thickness, photons, seed, out):
     paths. The verdict goes by the worse of the two: up to 10 % good, 25 % fair, 60 % poor, beyond
     it bad.
     """
-    from renderer.medium import preset
-    from renderer.profiles import judge
+    from renderer.optics import judge
+    from renderer.optics.medium import preset
 
     writable(out, (".csv", ".md"))
     names = media or judge.MATERIALS

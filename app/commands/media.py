@@ -95,7 +95,7 @@ def medium_options(command):
 
 def _layer(text: str):
     from renderer.errors import InputError
-    from renderer.medium import Layer, Medium
+    from renderer.optics.medium import Layer, Medium
 
     given = {}
     for item in text.split():
@@ -124,11 +124,11 @@ def _layer(text: str):
 
 
 def stack_of(medium, sigma_a, sigma_s_prime, eta, g, thickness, n_below, roughness, layers):
-    """The renderer.medium.Stack that the options describe."""
+    """The renderer.optics.medium.Stack that the options describe."""
     from dataclasses import replace
 
     from renderer.errors import InputError
-    from renderer.medium import Layer, Medium, Stack, preset
+    from renderer.optics.medium import Layer, Medium, Stack, preset
 
     by_numbers = {"--sigma-a": sigma_a, "--sigma-s-prime": sigma_s_prime, "--eta": eta, "--g": g}
     numbers = [name for name, value in by_numbers.items() if value is not None]

@@ -74,7 +74,7 @@ def command(
     Shares are of the incident light. Specular is what leaves above without being scattered,
     ballistic the same below. R and T are what leaves scattered, per mm^2, on rings around the beam.
     """
-    from renderer.profiles.montecarlo import Layer, simulate
+    from renderer.optics.montecarlo import Layer, simulate
 
     result = simulate(
         [Layer.parse(text) for text in layers],

@@ -68,8 +68,9 @@ def command(models, out, totals, r_max, points, terms, parametrisation, photons,
     import numpy as np
 
     from renderer.errors import InputError
-    from renderer.profiles import models as table_of_models
-    from renderer.profiles import table
+    from renderer.optics import models as table_of_models
+    from renderer.optics import table
+    from renderer.optics.medium import finest_mm, reach_mm
 
     stack = stack_of(**medium)
     parameters = {
@@ -99,14 +100,14 @@ def command(models, out, totals, r_max, points, terms, parametrisation, photons,
     if r_max is not None and not (np.isfinite(r_max) and r_max > 0):
         raise InputError(f"--r-max is {r_max:g}; expected more than 0 mm")
     r = np.geomspace(
-        min(table_of_models.finest_mm(stack) / 1000, (r_max or np.inf) / 1000),
-        r_max or table_of_models.reach_mm(stack),
+        min(finest_mm(stack) / 1000, (r_max or np.inf) / 1000),
+        r_max or reach_mm(stack),
         points,
     )
     if out.suffix.lower() == ".csv":
         out.write_text(table.profiles_csv(chosen, r), encoding="utf-8")
     else:
-        from renderer.profiles import figures
+        from renderer.optics import figures
 
         figures.save(figures.compare(chosen, r_max), out)
     click.echo(

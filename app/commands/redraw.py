@@ -43,7 +43,7 @@ def command(folder, wanted, suffix, photons, seed):
     With a million photons the three figures that need them take about a minute.
     """
     from renderer.errors import InputError
-    from renderer.profiles import figures
+    from renderer.optics import figures
 
     for name in wanted:
         if name not in figures.FIGURES:

@@ -94,6 +94,8 @@ class Program:
                 unit += 1
             elif kind in (GL.GL_INT, GL.GL_BOOL):
                 GL.glUniform1iv(where, size, np.ascontiguousarray(value, dtype=np.int32))
+            elif kind == GL.GL_INT_VEC2:
+                GL.glUniform2iv(where, size, np.ascontiguousarray(value, dtype=np.int32))
             elif kind in _FLOATS:
                 _FLOATS[kind](where, size, np.ascontiguousarray(value, dtype=np.float32))
             elif kind in _MATRICES:

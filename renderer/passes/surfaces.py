@@ -13,10 +13,11 @@ import numpy as np
 
 from renderer import gl
 from renderer.gl import GL
+from renderer.optics import fits, media
+from renderer.optics.curve import Curve
 from renderer.passes.bake import Baked, Body, bake
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
-from renderer.profiles import gaussians
 from renderer.scene.graph import Contents, Item
 from renderer.scene.material import Material, Skin
 from renderer.scene.model import MASKS
@@ -69,7 +70,7 @@ class Surfaces:
         light = part.proxy.to_full @ baked.light.reshape(-1, 9)
         openness = part.proxy.to_full @ baked.openness[:, None]
         scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
-        mesh = gl.Mesh(_attributes(part, part.masks, light, openness, scatters), part.indices)
+        mesh = gl.Mesh(_attributes(part, part.masks, light, openness, scatters), part.faces)
         number = 0
         if material.scatters and np.any(scatters):
             if material.medium not in self.media:
@@ -77,6 +78,12 @@ class Surfaces:
             number = 1 + self.media.index(material.medium)
         maps = {name: _map(getattr(part.material, name)) for name in MAPS}
         return Drawn(item, mesh, Baked(light.reshape(-1, 3, 3), openness[:, 0]), number, maps)
+
+    def curve(self, medium: int) -> Curve:
+        """The reference curve of a medium by its id; of the default skin where none scatters."""
+        if not self.media:
+            return media.curve("skin")
+        return media.curve(self.media[medium - 1])
 
     def vertices(self) -> np.ndarray:
         """All positions (N, 3) in the world, mm."""
@@ -136,6 +143,7 @@ class Surfaces:
         material, marks = part.material.value, part.landmarks
         skin = material if isinstance(material, Skin) else Skin()
         rng = np.random.default_rng([self.seed, 3])
+        through = fits.gaussian_sum(self.curve(max(drawn.id, 1)), 6)
         nowhere = np.zeros(3)
         return {
             "model": drawn.item.pose,
@@ -172,8 +180,8 @@ class Surfaces:
             "lip_folds": skin.lip_folds,
             "roughness_dry": skin.roughness_dry,
             "roughness_oily": skin.roughness_oily,
-            "gaussian_falloff": 0.5 / gaussians.SKIN_VARIANCE_MM2,
-            "gaussian_weight": gaussians.SKIN_WEIGHTS,
+            "gaussian_falloff": 0.5 / through.variance_mm2,
+            "gaussian_weight": through.weights,
             "thickness_scale": THICKNESS_SCALE,
             "transmission_wrap": TRANSMISSION_WRAP,
         }
@@ -181,7 +189,7 @@ class Surfaces:
     def points(self, drawn: Drawn, faces: np.ndarray, weights: np.ndarray) -> gl.Mesh:
         """Points on a surface as a mesh: triangles (K,) and barycentric weights (K, 3)."""
         part = drawn.item.primitive
-        corners = np.asarray(part.indices).reshape(-1, 3)[faces]
+        corners = part.faces[faces]
         scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
         light = drawn.baked.light.reshape(-1, 9)
         whole = _attributes(part, part.masks, light, drawn.baked.openness[:, None], scatters)
@@ -212,7 +220,7 @@ def _body(item: Item) -> Body:
         return Body(positions, normals, proxy.faces, np.asarray(albedo))
     positions, normals = _world(item, part.positions), _turned(item, part.normals)
     grey = np.full((len(positions), 3), 0.5)
-    return Body(positions, normals, np.asarray(part.indices).reshape(-1, 3), grey)
+    return Body(positions, normals, part.faces, grey)
 
 
 def _attributes(part, masks, light, openness, scatters) -> dict[int, np.ndarray]:
@@ -239,7 +247,7 @@ def _eye(item: Item, baked: Baked) -> Drawn:
     attributes = _attributes(
         part, np.zeros((count, len(MASKS))), flat, baked.openness[:, None], np.zeros(count)
     )
-    return Drawn(item, gl.Mesh(attributes, part.indices), baked)
+    return Drawn(item, gl.Mesh(attributes, part.faces), baked)
 
 
 def _map(image: np.ndarray | None) -> gl.Texture:

@@ -46,6 +46,7 @@ class SurfacePrimitive(pyrender.Primitive):
     def __init__(self, skin: Surface, material: SurfaceMaterial, landmarks: dict[str, np.ndarray]):
         super().__init__(skin.positions, skin.normals, None, skin.uvs, indices=skin.faces)
         self.material = material
+        self.faces = skin.faces  # pyrender keeps indices as floats
         self.masks, self.proxy, self.scatters = skin.masks, skin.proxy, skin.scatters
         self.landmarks = landmarks
 
@@ -55,7 +56,7 @@ class EyePrimitive(pyrender.Primitive):
 
     def __init__(self, eye: Eye):
         super().__init__(eye.positions, eye.normals, indices=eye.faces)
-        self.eye = eye
+        self.eye, self.faces = eye, eye.faces
 
 
 class StrandPrimitive(pyrender.Primitive):

@@ -23,9 +23,9 @@ FRECKLE_AREA, MOTTLING_MEAN, DOTS_MEAN = 0.03, 0.09, 0.22
 class Material(Parameters):
     """A surface of one colour, or with maps, over a medium that scatters or does not.
 
-    medium: a preset's name or a table of coefficients (renderer.medium), "" for a surface that
-    does not scatter. albedo is linear, the share of diffuse light that comes back. Maps are image
-    files (a scan brings its own): albedo in sRGB, normals in tangent space, roughness grey.
+    medium: a preset's name or a table of coefficients (renderer.optics.media), "" for a surface
+    that does not scatter. albedo is linear, the share of diffuse light that comes back. Maps are
+    image files (a scan brings its own): albedo in sRGB, normals in tangent space, roughness grey.
     """
 
     kind: ClassVar[str] = "plain"

@@ -37,6 +37,9 @@ vec4 take(int k, Pixel p, inout Sum sum) {
     float r = sqrt(s.z * s.z + dz * dz);
     vec3 third = exp(-shape * r / 3.0);
     vec3 w = shape * (third * third * third + third) * s.w;  // R(r') r' over R(r) r
+#if SURFACE_WEIGHTS
+    w *= s.z / r;  // R(r') over R(r): the disc's samples stand for equal areas of the surface
+#endif
     sum.weight += w;
     sum.light += w * e.rgb;
     return vec4(e.rgb, 1.0);

@@ -5,8 +5,6 @@ Technique number eleven: its two files, this table, its test.
 
 from __future__ import annotations
 
-import dataclasses
-
 from renderer.errors import InputError
 from renderer.techniques.base import Technique
 from renderer.techniques.golubev import Golubev
@@ -29,7 +27,7 @@ def make(name: str, parameters: dict | None = None) -> Technique:
     if name not in TECHNIQUES:
         raise InputError(f"no technique {name!r}; expected one of {', '.join(TECHNIQUES)}")
     kind = TECHNIQUES[name]
-    known = [f.name for f in dataclasses.fields(kind)]
+    known = kind.names()
     for key in parameters or {}:
         if key not in known:
             raise InputError(

@@ -1,43 +1,28 @@
-"""What every technique is: frozen, validated parameters and one pure pass, irradiance in, scattered
-irradiance out.
-"""
+"""What every technique is: frozen, checked parameters and one pure pass, light in, light out."""
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from OpenGL import GL
 
 from renderer.errors import InputError
+from renderer.optics.curve import Curve, edge_error
+from renderer.parameters import Parameters
 
-
-def parameter(
-    default,
-    *,
-    unit: str,
-    source: str,
-    low: float | None = None,
-    high: float | None = None,
-    choices: tuple = (),
-):
-    """A dataclass field with its unit, range (or choices) and source."""
-    return field(
-        default=default,
-        metadata={"unit": unit, "source": source, "low": low, "high": high, "choices": choices},
-    )
+if TYPE_CHECKING:
+    from renderer import gl
 
 
 @dataclass(frozen=True)
 class Inputs:
     """The shared buffers, all (height, width) at the resolution at which scattering is computed.
 
-    irradiance: RGBA32F, rgb = E, alpha = 1 on scattering material. depth_normal: RGBA32F, x = view
-    depth in mm (0 where nothing is), yzw = view-space normal. pixels_per_mm: pixels of this
-    resolution per mm at 1 mm distance. supersample: pixels of this resolution per output pixel,
-    along one side.
+    irradiance: RGBA32F, rgb = E, alpha = 1 where the medium at hand scatters. depth_normal:
+    RGBA32F, x = view depth in mm (0 where nothing is), yzw = view-space normal. pixels_per_mm:
+    pixels of this resolution per mm at 1 mm distance. supersample: pixels of this resolution per
+    output pixel, along one side. curve: the medium's reference curve.
     """
 
     context: object
@@ -48,23 +33,27 @@ class Inputs:
     height: int
     pixels_per_mm: float
     supersample: int
+    curve: Curve
 
 
 @dataclass(frozen=True)
 class Scattered:
-    """target.textures[0]: RGBA32F scattered irradiance; [1]: RGBA16F, x = samples taken, y =
-    contrast (where it is measured).
+    """What a technique returns.
+
+    target.textures[0]: RGBA32F scattered irradiance; [1]: RGBA16F, x = samples taken, y = contrast
+    (where it is measured).
     """
 
-    target: object
+    target: gl.Target
 
 
 @dataclass(frozen=True)
-class Technique:
+class Technique(Parameters):
     """Base of all techniques.
 
     `translucent`: transmitted light is added before scattering; `measures_contrast`: it writes
-    contrast.
+    contrast. Kernels are fitted to the medium's curve: `edge` is what the kernel for a curve
+    answers to a straight edge, and `fit_error` how far that is from the curve's own answer.
     """
 
     name: ClassVar[str]
@@ -73,60 +62,31 @@ class Technique:
     translucent: ClassVar[bool] = True
     measures_contrast: ClassVar[bool] = False
 
-    def __post_init__(self):
-        for f in dataclasses.fields(self):
-            value, meta = getattr(self, f.name), f.metadata
-            where = f"{self.name}.{f.name}"
-            if meta["choices"]:
-                if value not in meta["choices"]:
-                    raise InputError(
-                        f"{where} is {value!r}; expected one of "
-                        f"{', '.join(map(repr, meta['choices']))}"
-                    )
-                continue
-            kind = type(f.default)
-            values = value if isinstance(value, (tuple, list)) else (value,)
-            if isinstance(f.default, tuple):
-                if not isinstance(value, (tuple, list)) or len(value) != len(f.default):
-                    raise InputError(f"{where} is {value!r}; expected {len(f.default)} numbers")
-                kind = float
-                object.__setattr__(self, f.name, tuple(value))
-            for x in values:
-                good = (
-                    isinstance(x, bool)
-                    if kind is bool
-                    else isinstance(x, (int, float)) and not isinstance(x, bool) and np.isfinite(x)
-                )
-                if kind is int:
-                    good = good and x == int(x)
-                if not good:
-                    words = {bool: "true or false", int: "an integer"}.get(kind, "a number")
-                    raise InputError(f"{where} is {value!r}; expected {words}")
-                if kind is not bool and not (meta["low"] <= x <= meta["high"]):
-                    raise InputError(
-                        f"{where} is {value!r} {meta['unit']}; expected {meta['low']} to "
-                        f"{meta['high']}"
-                    )
-            if kind is int:
-                object.__setattr__(self, f.name, int(value))
+    @classmethod
+    def where(cls, field: str) -> str:
+        return f"{cls.name}.{field}"
 
-    def parameters(self) -> dict:
+    def parameters(self) -> dict[str, Any]:
         """The parameters as plain values, for the manifest."""
-        return {
-            f.name: list(v) if isinstance(v := getattr(self, f.name), tuple) else v
-            for f in dataclasses.fields(self)
-        }
+        return self.plain()
 
-    def self_check(self) -> None:
-        """Raise AssertionError if the kernel is not what the paper says."""
+    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
+        """The kernel's own answer to a straight edge, light where x < 0: (N,) mm -> (N, C)."""
+        raise NotImplementedError(f"{self.name} has no kernel")
+
+    def fit_error(self, curve: Curve) -> np.ndarray:
+        """rms at a straight edge between the technique's kernel and the curve: (C,)."""
+        return edge_error(curve, lambda x: self.edge(curve, x))
+
+    def self_check(self, curve: Curve) -> None:
+        """Raise AssertionError if the kernel for a curve is not what the paper says."""
 
     def scatter(self, inputs: Inputs) -> Scattered:
         """Run the technique."""
         raise NotImplementedError(f"{self.name} has no pass")
 
 
-def output_formats() -> list[int]:
-    """Formats of the final target of every technique: scattered irradiance, then samples and
-    contrast.
-    """
-    return [GL.GL_RGBA32F, GL.GL_RGBA16F]
+def odd(where: str, value: int) -> None:
+    """InputError unless the value is odd."""
+    if value % 2 == 0:
+        raise InputError(f"{where} is {value}; expected an odd number")

@@ -9,21 +9,18 @@ that know depth, normalised by their sum.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from renderer import gl
-from renderer.profiles import burley, gaussians
-from renderer.techniques.base import Inputs, Scattered, Technique, output_formats, parameter
+from renderer.optics import burley, fits
+from renderer.optics.curve import Curve
+from renderer.parameters import parameter
+from renderer.techniques.base import Inputs
+from renderer.techniques.screen import ScreenTechnique
 
 GOLDEN = 0.618033988749895
 FILTER_CDF = 0.997  # the share of the energy within the filter's radius
-
-# The same skin as the Gaussian techniques: the Burley profile of equal mean radius, per channel.
-SKIN_DISTANCE_MM = tuple(
-    round(float(d), 4) for d in burley.from_mean_radius(gaussians.mean_radius())
-)
 
 
 def disc(samples: int, distance_mm: float) -> np.ndarray:
@@ -39,59 +36,70 @@ def disc(samples: int, distance_mm: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Golubev(Technique):
-    """Defaults: 22 samples as in the thesis; distances of the skin that the Gaussian techniques
-    use.
+class Golubev(ScreenTechnique):
+    """22 samples as in the thesis; distances fitted to the medium's curve unless given.
+
+    weights "surface": R(r') over R(r), the estimator on the surface itself, whatever its tilt;
+    "published": times r' / r, as in the published code, which takes far samples of a tilted
+    surface for too many.
     """
 
     samples: int = parameter(
-        22, unit="samples a pixel", low=1, high=128, source="thesis, ch. 5; 21 and 55 in HDRP 2018"
+        22, unit="samples a pixel", low=1, high=256, source="thesis, ch. 5; 21 and 55 in HDRP 2018"
     )
-    distance_mm: tuple[float, float, float] = parameter(
-        SKIN_DISTANCE_MM,
+    distance_mm: tuple[float, float, float] | None = parameter(
+        (None, (1.0, 1.0, 1.0)),
         unit="mm, d = 1/s per channel",
         low=1e-3,
         high=100.0,
-        source="equal mean radius to d'Eon and Luebke 2007's skin",
+        source="fitted to the medium's curve where it is not given",
+        optional=True,
     )
     scale: float = parameter(
-        1.0, unit="mm of skin per mm of profile", low=0.01, high=20.0, source="HDRP world scale"
+        1.0,
+        unit="mm of skin per mm of profile",
+        low=0.01,
+        high=20.0,
+        source="HDRP world scale",
+    )
+    weights: str = parameter(
+        "surface", choices=("surface", "published"), source="HDRP 2018 multiplies by r' / r"
     )
 
     name: ClassVar[str] = "golubev"
     title: ClassVar[str] = "Golubev"
     paper: ClassVar[str] = "Golubev 2018, SIGGRAPH course"
 
-    def distances(self) -> np.ndarray:
+    def distances(self, curve: Curve) -> np.ndarray:
         """d per channel after scaling, mm: (3,)."""
-        return np.array(self.distance_mm) * self.scale
+        own = self.distance_mm
+        found = fits.burley_distance(curve).distance_mm if own is None else np.array(own)
+        return found * self.scale
 
-    def filter_radius_mm(self) -> float:
+    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
+        return fits.BurleyFit(self.distances(curve), np.zeros(3)).edge(x_mm)
+
+    def filter_radius_mm(self, curve: Curve) -> float:
         """Radius that holds FILTER_CDF of the widest channel's energy."""
-        return float(burley.inverse_cdf(FILTER_CDF, self.distances().max()))
+        return float(burley.inverse_cdf(FILTER_CDF, self.distances(curve).max()))
 
-    def uniforms(self, inputs: Inputs) -> dict:
-        """What the shader of every technique of this family takes."""
+    def table(self, curve: Curve) -> np.ndarray:
+        """The samples in the order in which they are taken: (samples, 4), see `disc`."""
+        return disc(self.samples, float(self.distances(curve).max()))
+
+    def defines(self) -> dict[str, Any]:
+        return {"SAMPLES": self.samples, "SURFACE_WEIGHTS": int(self.weights == "surface")}
+
+    def uniforms(self, inputs: Inputs) -> dict[str, Any]:
         return {
-            "irradiance": inputs.irradiance,
-            "depth_normal": inputs.depth_normal,
-            "pixels_per_mm": inputs.pixels_per_mm,
-            "shape": 1 / self.distances(),
-            "filter_radius_mm": self.filter_radius_mm(),
+            "samples": self.table(inputs.curve),
+            "shape": 1 / self.distances(inputs.curve),
+            "filter_radius_mm": self.filter_radius_mm(inputs.curve),
         }
 
-    def self_check(self) -> None:
+    def self_check(self, curve: Curve) -> None:
         u = (np.arange(self.samples) + 0.5) / self.samples
-        table = disc(self.samples, float(self.distances().max()))
-        assert np.allclose(burley.cdf(table[:, 2], self.distances().max()), u, atol=1e-12)
+        widest = float(self.distances(curve).max())
+        table = disc(self.samples, widest)
+        assert np.allclose(burley.cdf(table[:, 2], widest), u, atol=1e-12)
         assert np.isfinite(table).all() and (np.diff(table[:, 2]) > 0).all()
-
-    def scatter(self, inputs: Inputs) -> Scattered:
-        program = inputs.programs("techniques/golubev.glsl", {"SAMPLES": self.samples})
-        target = gl.Target(inputs.width, inputs.height, output_formats())
-        target.bind()
-        program.use(
-            samples=disc(self.samples, float(self.distances().max())), **self.uniforms(inputs)
-        )
-        gl.draw_fullscreen(inputs.context)
-        return Scattered(target)

@@ -14,14 +14,15 @@ without skin gives no contrast.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from renderer import gl
 from renderer.errors import InputError
-from renderer.techniques.base import Inputs, Scattered, output_formats, parameter
-from renderer.techniques.golubev import Golubev, disc
+from renderer.optics.curve import Curve
+from renderer.parameters import parameter
+from renderer.techniques.base import Inputs
+from renderer.techniques.golubev import Golubev
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class GolubevPlus(Golubev):
     """12 base samples, 10 more where contrast is high."""
 
     base_samples: int = parameter(
-        12, unit="of the samples", low=2, high=128, source="thesis, sec. 4.3"
+        12, unit="of the samples", low=2, high=256, source="thesis, sec. 4.3"
     )
     offset: float = parameter(
         0.25,
@@ -51,12 +52,12 @@ class GolubevPlus(Golubev):
     paper: ClassVar[str] = "Vuletic, master's thesis, ch. 4"
     measures_contrast: ClassVar[bool] = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if self.base_samples >= self.samples:
             raise InputError(
-                f"{self.name}.base_samples is {self.base_samples}; expected fewer than "
-                f"samples, {self.samples}"
+                f"{self.name}.base_samples is {self.base_samples}; expected fewer than samples, "
+                f"{self.samples}"
             )
 
     def order(self) -> np.ndarray:
@@ -66,25 +67,21 @@ class GolubevPlus(Golubev):
         ).astype(int)
         return np.concatenate([base, np.setdiff1d(np.arange(self.samples), base)])
 
-    def self_check(self) -> None:
-        super().self_check()
-        order = self.order()
-        assert (
-            sorted(order) == list(range(self.samples))
-            and len(set(order[: self.base_samples])) == self.base_samples
-        )
+    def table(self, curve: Curve) -> np.ndarray:
+        return super().table(curve)[self.order()]
 
-    def scatter(self, inputs: Inputs) -> Scattered:
-        table = disc(self.samples, float(self.distances().max()))[self.order()]
-        program = inputs.programs("techniques/golubev_plus.glsl", {"SAMPLES": self.samples})
-        target = gl.Target(inputs.width, inputs.height, output_formats())
-        target.bind()
-        program.use(
-            samples=table,
-            base=self.base_samples,
-            threshold=0.5 - self.offset,
-            inner_mm=self.inner_radius * table[: self.base_samples, 2].max(),
-            **self.uniforms(inputs),
-        )
-        gl.draw_fullscreen(inputs.context)
-        return Scattered(target)
+    def uniforms(self, inputs: Inputs) -> dict[str, Any]:
+        shared = super().uniforms(inputs)
+        farthest = shared["samples"][: self.base_samples, 2].max()
+        own = {
+            "base": self.base_samples,
+            "threshold": 0.5 - self.offset,
+            "inner_mm": self.inner_radius * farthest,
+        }
+        return {**shared, **own}
+
+    def self_check(self, curve: Curve) -> None:
+        super().self_check(curve)
+        order = self.order()
+        assert sorted(order) == list(range(self.samples))
+        assert len(set(order[: self.base_samples])) == self.base_samples

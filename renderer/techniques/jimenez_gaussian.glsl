@@ -3,6 +3,8 @@ uniform sampler2D source; uniform sampler2D sum_so_far; uniform sampler2D irradi
 uniform float taps[7];
 uniform float sigma;          // mm, incremental
 uniform float alpha;          // pixels per mm of sigma at 1 m
+uniform float focal;          // output pixels at unit distance
+uniform int published;        // 1: the stretch of the paper's eq. 3, 0: the surface's foreshortening
 uniform float beta; uniform float gradient_limit; uniform float supersample;
 uniform int reach;  // 3 taps each way; no constant: an unrolled loop would run for pixels without skin too
 uniform vec2 axis; uniform vec3 weight; uniform vec3 sum_scale; uniform float samples; uniform int final;
@@ -17,8 +19,9 @@ void main() {
     bool skin = texelFetch(irradiance, at, 0).a > 0.5;
     vec3 sum = centre.rgb;
     if (skin) {
-        float slope = min(abs(dot(derivative, axis)), gradient_limit);
-        vec2 stride = axis * sigma * alpha / (depth + beta * slope) / vec2(textureSize(source, 0));
+        float slope = abs(dot(derivative, axis)), tangent = slope * focal / depth;
+        float near = published == 1 ? 1.0 / (depth + beta * min(slope, gradient_limit)) : inversesqrt(1.0 + tangent * tangent) / depth;
+        vec2 stride = axis * sigma * alpha * near / vec2(textureSize(source, 0));
         vec2 uv = gl_FragCoord.xy / vec2(textureSize(source, 0));
         sum = taps[3] * centre.rgb;
         for (int k = -reach; k <= reach; ++k) {

@@ -1,10 +1,10 @@
 """Screen-space sum of Gaussians.
 
 Jimenez, Sundstedt and Gutierrez 2009, "Screen-space perceptual rendering of human skin", ACM TAP
-6(4), doi:10.1145/1609967.1609970. Six Gaussians (d'Eon and Luebke 2007); the first is narrower than
-a pixel and is the unblurred image; each other one blurs the one before by the difference of
-variances, horizontally, then vertically, with seven taps whose spacing is sigma * alpha / (depth +
-beta |depth derivative|).
+6(4), doi:10.1145/1609967.1609970. A sum of Gaussians, six in the paper (d'Eon and Luebke 2007); the
+first is narrower than a pixel there and left unblurred; each other one blurs the one before by the
+difference of variances, horizontally, then vertically, with seven taps whose spacing follows depth
+and its derivative.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from OpenGL import GL
 
-from renderer import gl
-from renderer.profiles import gaussians
-from renderer.techniques.base import Inputs, Scattered, Technique, output_formats, parameter
+from renderer.gl import GL
+from renderer.optics import fits
+from renderer.optics.curve import Curve
+from renderer.parameters import parameter
+from renderer.techniques.screen import Canvas, ScreenTechnique
 
 TAPS = np.array(
     [0.006, 0.061, 0.242, 0.382, 0.242, 0.061, 0.006]
@@ -28,20 +29,33 @@ TAPS_VARIANCE = float(
 
 
 @dataclass(frozen=True)
-class JimenezGaussian(Technique):
+class JimenezGaussian(ScreenTechnique):
     """The 2009 filter.
 
-    alpha = 0 derives alpha from the camera, so that sigma keeps its millimetres; the paper's alpha
-    = 11 is the same quantity (output pixels per mm of sigma at a depth of one metre) tuned for its
-    camera.
+    kernel "fitted": `terms` Gaussians nearest to the medium's curve; "published": d'Eon and
+    Luebke's six, whatever the medium. alpha = 0 derives alpha from the camera, so that sigma keeps
+    its millimetres; the paper's alpha = 11 is the same quantity (output pixels per mm of sigma at a
+    depth of one metre) tuned for its camera. first "blurred": the narrowest Gaussian is as wide as
+    it is; "published": it is the unblurred image. stretch "geometry": taps come closer by the true
+    foreshortening of the surface; "published": by alpha / (depth + beta |d depth|) of eq. 3.
     """
 
+    kernel: str = parameter(
+        "fitted", choices=("fitted", "published"), source="Jimenez 2009 takes d'Eon and Luebke's"
+    )
+    terms: int = parameter(6, unit="Gaussians", low=2, high=10, source="six in the paper")
     alpha: float = parameter(
         0.0,
         unit="px m/mm (0: from the camera)",
         low=0.0,
         high=200.0,
         source="Jimenez 2009, eq. 3; 11 there",
+    )
+    first: str = parameter(
+        "blurred", choices=("blurred", "published"), source="Jimenez 2009, sec. 3: unblurred"
+    )
+    stretch: str = parameter(
+        "geometry", choices=("geometry", "published"), source="Jimenez 2009, eq. 3"
     )
     beta: float = parameter(800.0, unit="px", low=0.0, high=1e5, source="Jimenez 2009, eq. 3")
     gradient_limit: float = parameter(
@@ -52,71 +66,77 @@ class JimenezGaussian(Technique):
     title: ClassVar[str] = "Gaussian"
     paper: ClassVar[str] = "Jimenez et al. 2009, doi:10.1145/1609967.1609970"
 
-    def blurs(self) -> list[tuple[float, np.ndarray]]:
-        """(incremental sigma in mm, weight (3,)) of the Gaussians after the first."""
-        variance = gaussians.SKIN_VARIANCE_MM2
-        sigma = np.sqrt(np.diff(variance) / TAPS_VARIANCE)
-        return list(zip(sigma, gaussians.SKIN_WEIGHTS[1:], strict=True))
+    def fit(self, curve: Curve) -> fits.GaussianFit:
+        """The Gaussians for a curve."""
+        if self.kernel == "published":
+            return fits.published_gaussians(curve)
+        return fits.gaussian_sum(curve, self.terms)
 
-    def self_check(self) -> None:
-        assert np.allclose(gaussians.SKIN_WEIGHTS.sum(axis=0), 1, atol=1e-9)
-        reached = gaussians.SKIN_VARIANCE_MM2[0] + np.cumsum(
-            [s**2 * TAPS_VARIANCE for s, _ in self.blurs()]
-        )
-        assert np.allclose(reached, gaussians.SKIN_VARIANCE_MM2[1:])
+    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
+        return self.fit(curve).edge(x_mm)
+
+    def blurs(self, fit: fits.GaussianFit) -> list[tuple[float, np.ndarray]]:
+        """(incremental sigma in mm, weight (3,)) of the Gaussians that are blurred."""
+        before = np.concatenate([[0.0], fit.variance_mm2[:-1]])
+        sigma = np.sqrt((fit.variance_mm2 - before) / TAPS_VARIANCE)
+        all_of_them = list(zip(sigma, fit.weights, strict=True))
+        return all_of_them if self.first == "blurred" else all_of_them[1:]
+
+    def self_check(self, curve: Curve) -> None:
+        fit = self.fit(curve)
+        assert np.allclose(fit.weights.sum(axis=0), 1, atol=1e-9)
+        steps = [s**2 * TAPS_VARIANCE for s, _ in self.blurs(fit)]
+        skipped = 0.0 if self.first == "blurred" else fit.variance_mm2[0]
+        assert np.allclose(skipped + np.cumsum(steps), fit.variance_mm2[-len(steps) :])
         assert np.allclose(TAPS, TAPS[::-1])
 
-    def scatter(self, inputs: Inputs) -> Scattered:
-        alpha = self.alpha or inputs.pixels_per_mm / inputs.supersample / 1000.0
-        program = inputs.programs("techniques/jimenez_gaussian.glsl")
-        ping, pong = (
-            gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F, GL.GL_RGBA32F]) for _ in range(2)
-        )
-        total = gl.Target(inputs.width, inputs.height, output_formats())
-        source, sum_so_far, blurs = inputs.irradiance, inputs.irradiance, self.blurs()
+    def passes(self, canvas: Canvas) -> None:
+        inputs = canvas.inputs
+        fit = self.fit(inputs.curve)
+        focal = inputs.pixels_per_mm / inputs.supersample  # output pixels at unit distance
         common = {
-            "irradiance": inputs.irradiance,
-            "depth_normal": inputs.depth_normal,
             "taps": TAPS / TAPS.sum(),
             "reach": len(TAPS) // 2,
-            "alpha": alpha * inputs.supersample,
+            "alpha": (self.alpha or focal / 1000.0) * inputs.supersample,
+            "focal": focal,
+            "published": int(self.stretch == "published"),
             "beta": self.beta,
             "gradient_limit": self.gradient_limit,
             "supersample": float(inputs.supersample),
         }
-        row = gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F])
+        both = (GL.GL_RGBA32F, GL.GL_RGBA32F)
+        ping, pong = canvas.target(*both), canvas.target(*both)
+        row = canvas.target()
+        source = total = inputs.irradiance
+        blurs, nothing = self.blurs(fit), (0.0, 0.0, 0.0)
+        unblurred = np.zeros(3) if self.first == "blurred" else fit.weights[0]
         for k, (sigma, weight) in enumerate(blurs):
             last = k == len(blurs) - 1
-            row.bind()
-            program.use(
+            own = {"sigma": sigma, "sum_so_far": total}
+            horizontal = {"axis": (1.0, 0.0), "weight": nothing, "sum_scale": nothing}
+            canvas.draw(
+                row,
+                self.file(),
+                {},
                 source=source,
-                sum_so_far=sum_so_far,
-                sigma=sigma,
-                axis=(1.0, 0.0),
-                weight=(0.0, 0.0, 0.0),
-                sum_scale=(0.0, 0.0, 0.0),
                 samples=0.0,
                 final=0,
+                **horizontal,
+                **own,
                 **common,
             )
-            gl.draw_fullscreen(inputs.context)
-            out = total if last else ping
-            out.bind()
-            first = gaussians.SKIN_WEIGHTS[0] if k == 0 else np.ones(3)
-            program.use(
+            canvas.draw(
+                canvas.result if last else ping,
+                self.file(),
+                {},
                 source=row.textures[0],
-                sum_so_far=sum_so_far,
-                sigma=sigma,
                 axis=(0.0, 1.0),
                 weight=weight,
-                sum_scale=first,
+                sum_scale=unblurred if k == 0 else np.ones(3),
                 samples=float(2 * len(TAPS) * len(blurs)),
                 final=int(last),
+                **own,
                 **common,
             )
-            gl.draw_fullscreen(inputs.context)
-            source, sum_so_far = ping.textures[0], ping.textures[1]
+            source, total = ping.textures[0], ping.textures[1]
             ping, pong = pong, ping
-        for target in (ping, pong, row):
-            target.delete()
-        return Scattered(total)

@@ -7,6 +7,7 @@ uniform vec2 axis;
 uniform float pixels_per_mm;     // at 1 mm
 uniform float follow_surface_mm;
 uniform float near_mm;
+uniform int plane;               // 1: taps follow the surface's own plane, 0: its depth alone
 layout(location = 0) out vec4 scattered;
 layout(location = 1) out vec4 count;
 
@@ -15,8 +16,9 @@ void main() {
     vec4 centre = texelFetch(source, at, 0);
     scattered = centre;
     count = vec4(0.0, 0.0, 0.0, 1.0);
-    if (texelFetch(irradiance, at, 0).a < 0.5) return;
     float depth = texelFetch(depth_normal, at, 0).x;
+    vec2 slope = plane == 1 ? vec2(dFdx(depth), dFdy(depth)) : vec2(0.0);  // mm of depth a pixel
+    if (texelFetch(irradiance, at, 0).a < 0.5) return;
     vec2 size = vec2(textureSize(source, 0)), uv = gl_FragCoord.xy / size;
     float scale = pixels_per_mm / depth;
     float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
@@ -25,9 +27,11 @@ void main() {
     for (int k = 0; k < taps; ++k) {
         float offset = kernel[k].w;
         vec2 direction = abs(offset) < near_mm ? turn * axis : axis;
-        vec2 there = uv + direction * offset * scale / size;
+        float tangent = dot(slope, direction) * scale;
+        vec2 apart = direction * offset * scale * inversesqrt(1.0 + tangent * tangent);
+        vec2 there = uv + apart / size;
         vec3 tap = texture(source, there).rgb;
-        float away = abs(texture(depth_normal, there).x - depth) / follow_surface_mm;
+        float away = abs(texture(depth_normal, there).x - depth - dot(slope, apart)) / follow_surface_mm;
         if (texture(irradiance, there).a < 0.5) away = 1.0;
         sum += kernel[k].rgb * mix(tap, centre.rgb, clamp(away, 0.0, 1.0));
     }

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from renderer import gl
-from renderer.techniques.base import Inputs, Scattered, Technique, output_formats
+import numpy as np
+
+from renderer.optics.curve import Curve
+from renderer.techniques.screen import ScreenTechnique
 
 
 @dataclass(frozen=True)
-class NoScattering(Technique):
+class NoScattering(ScreenTechnique):
     """Lambert's law alone; one sample a pixel."""
 
     name: ClassVar[str] = "none"
@@ -18,9 +20,5 @@ class NoScattering(Technique):
     paper: ClassVar[str] = "Lambert 1760, Photometria"
     translucent: ClassVar[bool] = False
 
-    def scatter(self, inputs: Inputs) -> Scattered:
-        target = gl.Target(inputs.width, inputs.height, output_formats())
-        target.bind()
-        inputs.programs("techniques/none.glsl").use(irradiance=inputs.irradiance)
-        gl.draw_fullscreen(inputs.context)
-        return Scattered(target)
+    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
+        return np.repeat((np.asarray(x_mm)[:, None] < 0) * 1.0, curve.channels, axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from renderer.profiles import burley, gaussians
+from renderer.optics import burley, gaussians
 
 
 def test_six_gaussians_hold_all_energy():

@@ -101,7 +101,7 @@ def test_factors_are_crossed_and_their_levels_patch_the_scene(write_toml):
     assert cell.levels == {"framing": "far", "person": "pale", "light": "noon"}
     assert study.cell_label(cell) == "Far, A pale man, Noon"
     table = study.scene_of(cell)
-    assert table["rig"] == "noon" and table["materials"]["head"] == {"melanin": 0.05}
+    assert table["rig"] == "noon" and table["materials"]["head"]["melanin"] == 0.05
     scene = read_scene(table)
     assert list(scene.lights) == ["sun"] and scene.camera.framing == "far"
     assert scene.materials["head"].melanin == 0.05
