@@ -125,7 +125,12 @@ def test_a_lamp_among_the_objects_casts_shadows_all_around(shadow):
     """A lamp inside a room: walls are lit on all sides, and dark behind a ball."""
     made = {
         "objects": {
-            "room": {"shape": "box", "size_mm": [200.0, 200.0, 200.0]},
+            "room": {
+                "shape": "box",
+                "size_mm": [200.0, 200.0, 200.0],
+                "left_albedo": [0.0, 0.0, 0.0],
+                "right_albedo": [0.0, 0.0, 0.0],
+            },
             "ball": {"shape": "sphere", "radius_mm": 20.0, "position_mm": [0.0, 0.0, -50.0]},
         },
         "materials": {
