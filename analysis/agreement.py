@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
+from math import comb
 
 import numpy as np
 import pandas as pd
@@ -45,6 +46,14 @@ PARTICIPANTS = (
 #: Chance with which a one-sided person must be incompatible before `Exclusions.one_side_share`
 #: applies.
 ONE_SIDE_P = 0.001
+#: What a person must have given before a rule can say anything of them: rule -> (how many, of
+#: what). `one_side_share` needs eleven decided answers by its p alone.
+ENOUGH = {
+    "median_rt_ms": (5, "timed answers"),
+    "same_answer_share": (10, "answers"),
+    "zeta": (10, "triads answered in full"),
+    "repeat_share": (5, "questions that prefer one both times they are asked"),
+}
 
 
 def agreement(responses: Responses, options: Options) -> pd.DataFrame:
@@ -134,6 +143,7 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
 
     parts = list(panels(responses).values())[-1].parts  # of all framings or levels
     circles, zetas, whole = np.zeros(len(table)), np.zeros(len(table)), np.zeros(len(table), int)
+    asked_triads = np.zeros(len(table), int)
     for panel in parts:
         full = _complete(panel)
         if full.any():
@@ -141,6 +151,7 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
             circles[full] += circular
             zetas[full] += zeta(circular, len(panel.items))
             whole[full] += 1
+            asked_triads[full] += comb(len(panel.items), 3)
     table["circular_triads"] = np.where(whole > 0, circles, np.nan)
     table["zeta"] = np.divide(zetas, whole, out=np.full(len(table), np.nan), where=whole > 0)
 
@@ -155,6 +166,14 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
         np.sign(both.preference.astype(int)) == np.sign(both.first_preference.astype(int))
     ).groupby(both.participant, observed=True)
     table["repeat_share"] = same.mean().reindex(table.index).astype(float) if len(both) else np.nan
+    given = {
+        "median_rt_ms": grouped.rt_ms.count().to_numpy(),
+        "same_answer_share": table.answers.to_numpy(),
+        "zeta": asked_triads,
+        "repeat_share": same.size().reindex(table.index, fill_value=0).to_numpy()
+        if len(both)
+        else np.zeros(len(table), int),
+    }
 
     preference = np.concatenate(
         [np.where(panel.answered, panel.preference, 0) for panel in parts], axis=1
@@ -166,24 +185,51 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
         (preference * others).sum(axis=1), length, out=np.full(len(table), np.nan), where=length > 0
     )
     table = table.reset_index().astype({"participant": object})
-    table["excluded"] = _excluded(table, _questions(parts, responses.codebook), options.exclusions)
+    questions = _questions(parts, responses.codebook)
+    table["excluded"] = _excluded(table, questions, options.exclusions, given)
     table = table[list(PARTICIPANTS)]
     table.attrs["notes"] = (
-        (
-            f"declared exclusions: {_rules(options.exclusions)}; they apply in the table of "
-            "sensitivity alone"
-        ),
+        f"rules of exclusion: {rules_in_words(options)}; they apply in the table of sensitivity "
+        "alone",
+        *_silent(options.exclusions, given),
     )
     return table
+
+
+def side_balance(responses: Responses, options: Options) -> pd.DataFrame:
+    """framing, technique, left, right, left_share, p, holm_p: on which side each technique stood.
+
+    p: two-sided exact binomial of as often left as right; holm_p over the techniques of a framing.
+    Where sides were shuffled only chance makes them uneven; attrs['notes'] name the framings where
+    side and technique are confounded, see `worth.confounded_side`.
+    """
+    frame = responses.frame
+    rows, notes = [], []
+    for name, items in responses.items.items():
+        here = frame[frame.framing == name]
+        left_name = np.where(here.a_left, here.a.astype(object), here.b.astype(object))
+        right_name = np.where(here.a_left, here.b.astype(object), here.a.astype(object))
+        left = np.array([(left_name == item).sum() for item in items])
+        right = np.array([(right_name == item).sum() for item in items])
+        p = np.minimum(1, 2 * stats.binom.cdf(np.minimum(left, right), left + right, 0.5))
+        values = zip(items, left, right, left / (left + right), p, inference.holm(p), strict=True)
+        rows += [(name, *value) for value in values]
+        reason = worth.confounded_side(panels(responses)[name])
+        if reason:
+            notes.append(f"{name}: {reason}")
+    columns = ["framing", "technique", "left", "right", "left_share", "p", "holm_p"]
+    return noted(rows, columns, notes)
 
 
 def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
     """framing, conclusion, a, b, everyone, without_excluded, changed (0 or 1): what hangs on the
     declared exclusions.
 
-    conclusion  'preferred': the technique of the pair that holm_p < alpha prefers, '' for none
-                'equivalent': '1' or '0', where a margin was declared 'first': the technique with
-                the highest bradley_terry worth, '' where there is no fit; a and b are empty
+    conclusion  'preferred': the technique of the pair that the declared test prefers after Holm's
+                correction, '' for none
+                'equivalent': '1' or '0', where a margin was declared, as `inference.verdict`
+                'first': the technique with the highest bradley_terry worth, '' where there is no
+                fit; a and b are empty
 
     Without anybody to exclude, and without enough people left, attrs['notes'] say so.
     """
@@ -192,7 +238,7 @@ def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
     columns = ["framing", "conclusion", "a", "b", "everyone", "without_excluded", "changed"]
     lean = replace(options, models=("bradley_terry",))
     everyone = _conclusions(responses, lean)
-    notes = [f"{len(out)} of {len(table)} participants are excluded: {_rules(options.exclusions)}"]
+    notes = [f"{len(out)} of {len(table)} participants are excluded: {rules_in_words(options)}"]
     if len(out) == len(table):
         return noted([], columns, [*notes, "nobody is left: no comparison"])
     rest = everyone
@@ -208,20 +254,24 @@ def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
 
 
 def _conclusions(responses: Responses, options: Options) -> dict[tuple[str, str, str, str], str]:
-    found = {}
+    """(framing, conclusion, a, b) -> what is concluded, by the verdicts of the report."""
+    conclusions = {}
     for row in inference.pairs(responses, options).itertuples():
-        preferred = (
-            (row.b if row.rank_biserial > 0 else row.a) if row.holm_p < 1 - options.level else ""
+        verdict = inference.verdict(row, inference.alpha_of(options))
+        preferred = row.b if row.mean_preference > 0 else row.a
+        conclusions[row.framing, "preferred", row.a, row.b] = (
+            preferred if verdict in ("different", "both") else ""
         )
-        found[row.framing, "preferred", row.a, row.b] = preferred
-        if not np.isnan(row.equivalent):
-            found[row.framing, "equivalent", row.a, row.b] = f"{row.equivalent:.0f}"
+        if options.margin is not None or options.margin_jod is not None:
+            conclusions[row.framing, "equivalent", row.a, row.b] = str(
+                int(verdict in ("equivalent", "both"))
+            )
     for name, panel in panels(responses).items():
         worths = worth.estimated(panel, "bradley_terry", options)
-        found[name, "first", "", ""] = (
+        conclusions[name, "first", "", ""] = (
             "" if np.isnan(worths).any() else panel.items[int(np.argmax(worths))]
         )
-    return found
+    return conclusions
 
 
 def _questions(parts: tuple[Panel, ...], codebook: Codebook) -> np.ndarray | int:
@@ -238,7 +288,15 @@ def _questions(parts: tuple[Panel, ...], codebook: Codebook) -> np.ndarray | int
     )
 
 
-def _excluded(table: pd.DataFrame, questions: np.ndarray | int, rules: Exclusions) -> list[str]:
+def _excluded(
+    table: pd.DataFrame,
+    questions: np.ndarray | int,
+    rules: Exclusions,
+    given: Mapping[str, np.ndarray],
+) -> list[str]:
+    """The rules that apply to each participant, '' for none. given: rule -> how much of what
+    `ENOUGH` asks for each gave.
+    """
     decided = table.left + table.right
     checks = {
         "answered_share": rules.answered_share is not None
@@ -255,24 +313,47 @@ def _excluded(table: pd.DataFrame, questions: np.ndarray | int, rules: Exclusion
         and table.repeat_share < (rules.repeat_share or 0),
     }
     hits = {name: np.broadcast_to(np.asarray(hit), len(table)) for name, hit in checks.items()}
+    hits |= {name: hits[name] & (given[name] >= least) for name, (least, _) in ENOUGH.items()}
     return ["; ".join(name for name, hit in hits.items() if hit[row]) for row in range(len(table))]
 
 
-def _rules(rules: Exclusions) -> str:
+def _silent(rules: Exclusions, given: Mapping[str, np.ndarray]) -> list[str]:
+    """A note for each rule that can fire for nobody, since nobody gave enough."""
+    return [
+        f"the rule {name} can fire for nobody: it needs {least} {what} of a person, and the most "
+        f"that anybody gave is {given[name].max(initial=0)}"
+        for name, (least, what) in ENOUGH.items()
+        if getattr(rules, name) is not None and given[name].max(initial=0) < least
+    ]
+
+
+def rules_in_words(options: Options) -> str:
+    """The rules of exclusion, those that the study declared apart from defaults."""
     words = {
         "answered_share": "answered under {:.0%} of the questions",
-        "one_side_share": "at least {:.0%} on one side",
+        "one_side_share": "at least {:.0%} on one side, and not by chance (p < 0.001)",
         "median_rt_ms": "median answer under {:g} ms",
         "same_answer_share": "the same answer at least {:.0%} of the time",
         "zeta": "zeta under {:g}",
         "repeat_share": "under {:.0%} alike when asked again",
     }
-    declared = [
-        text.format(getattr(rules, name))
+    texts = {
+        name: text.format(getattr(options.exclusions, name)).replace("%", " %")
         for name, text in words.items()
-        if getattr(rules, name) is not None
-    ]
-    return ", or ".join(declared) if declared else "no rule is declared"
+        if getattr(options.exclusions, name) is not None
+    }
+    if not texts:
+        return "none"
+    declared = [text for name, text in texts.items() if f"exclusions.{name}" in options.declared]
+    default = [text for name, text in texts.items() if f"exclusions.{name}" not in options.declared]
+    return "; ".join(
+        f"{', or '.join(part)} ({source})"
+        for part, source in (
+            (declared, "declared by the study"),
+            (default, "defaults of subdermal, not declared"),
+        )
+        if part
+    )
 
 
 # --- with oneself
@@ -590,7 +671,7 @@ def _times(name: str, responses: Responses, panel: Panel, options: Options) -> l
         "median_rt_ms_none": none,
     }
     for label, chosen in kinds.items():
-        medians = np.sort(table[chosen].groupby("who").ms.median().to_numpy())
+        medians = np.sort(table[chosen].groupby("who").ms.median().dropna().to_numpy())
         if not len(medians):
             rows.append((label, np.nan, np.nan, np.nan, np.nan))
             continue

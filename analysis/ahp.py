@@ -117,8 +117,11 @@ def comparisons(responses: Responses) -> dict[str, Comparison]:
 
 
 def priorities(matrix: np.ndarray) -> Priorities:
-    """The principal eigenvector of a positive matrix (n, n), scaled to sum 1,
-    and its consistency.
+    """The principal eigenvector of a positive, reciprocal matrix (n, n), scaled to sum 1, and its
+    consistency.
+
+    Reciprocal: a_ik a_ki = 1 within `RECIPROCAL_TOLERANCE`, which a matrix printed with few digits
+    keeps; of another one lambda_max may be below n and a consistency ratio means nothing.
     """
     matrix = np.asarray(matrix, float)
     n = len(matrix)
@@ -127,6 +130,7 @@ def priorities(matrix: np.ndarray) -> Priorities:
             f"a matrix of shape {matrix.shape} has no priorities; expected it square, "
             "complete and positive"
         )
+    refuse_unless_reciprocal("the matrix", matrix, range(1, n + 1))
     values, vectors = np.linalg.eig(matrix)
     principal = np.argmax(values.real)
     vector = np.abs(vectors[:, principal].real)
@@ -137,6 +141,19 @@ def priorities(matrix: np.ndarray) -> Priorities:
     else:
         cr = ci / RANDOM_INDEX[n - 1] if n > 2 else 0.0
     return Priorities(vector / vector.sum(), lambda_max, ci, cr)
+
+
+def refuse_unless_reciprocal(name: str, matrix: np.ndarray, items: Sequence[object]) -> None:
+    """An InputError that names the worst pair, where a_ik a_ki is not 1 or a diagonal is not 1."""
+    off = np.abs(matrix * matrix.T - 1)
+    if off.max() > RECIPROCAL_TOLERANCE:
+        i, k = np.unravel_index(np.argmax(off), off.shape)
+        raise InputError(
+            f"{name} is not reciprocal: {items[i]} over {items[k]} is {matrix[i, k]:g} and "
+            f"the other way {matrix[k, i]:g}, "
+            f"their product is {matrix[i, k] * matrix[k, i]:g}, expected 1 within "
+            f"{RECIPROCAL_TOLERANCE}"
+        )
 
 
 def priorities_table(comparisons: Mapping[str, Comparison]) -> pd.DataFrame:
@@ -363,13 +380,5 @@ def _matrix(name: str, entry: object, items: Sequence[str]) -> np.ndarray:
                     f"{name}.rows[{i}][{k}] is {value!r:.60}, expected a positive number"
                 )
     matrix = np.array(rows, float)
-    off = np.abs(matrix * matrix.T - 1)
-    if off.max() > RECIPROCAL_TOLERANCE:
-        i, k = np.unravel_index(np.argmax(off), off.shape)
-        raise InputError(
-            f"{name} is not reciprocal: {items[i]} over {items[k]} is {matrix[i, k]:g} and "
-            f"the other way {matrix[k, i]:g}, "
-            f"their product is {matrix[i, k] * matrix[k, i]:g}, expected 1 within "
-            f"{RECIPROCAL_TOLERANCE}"
-        )
+    refuse_unless_reciprocal(name, matrix, items)
     return matrix

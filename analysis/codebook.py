@@ -19,8 +19,7 @@ FRAMING = "framing"
 #: From near to far. A randomised questionnaire shows them in any order, so that first appearance
 #: says nothing.
 KNOWN_FRAMINGS = ("close-up", "head-shot", "half-length")
-#: Levels 1 to 5 of the self-rating, and answers -2 to 2, where the study names none (study.md, 'The
-#: questionnaire').
+#: Labels of the levels 1 to 5 of the self-rating, where the study names none.
 FAMILIARITY = ("1, no familiarity", "2", "3", "4", "5, high familiarity")
 
 
@@ -29,6 +28,7 @@ class Codebook:
     """Order and labels of a study's framings and techniques; `order_rule` and `framing_rule` say
     where the orders come from.
 
+    familiarity: labels of the levels of the self-rating; ratings: the levels, as answered.
     factors: the columns of the levels that a study varies beside framing; images differ by them.
     factor: the column of the table that answers are grouped by. Where it is not 'framing',
     `framings` are its levels; see `by`.
@@ -40,6 +40,7 @@ class Codebook:
     framing_rule: str
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     familiarity: tuple[str, ...] = FAMILIARITY
+    ratings: tuple[int, ...] = (1, 2, 3, 4, 5)
     title: str = ""
     factor: str = FRAMING
     factors: tuple[str, ...] = ()
@@ -116,9 +117,11 @@ class Codebook:
         return replace(self, techniques=order, order_rule="as given on the command line")
 
 
-def from_table(framings: Iterable[str], techniques: Iterable[str]) -> Codebook:
+def from_table(
+    framings: Iterable[str], techniques: Iterable[str], ratings: tuple[int, ...] = (1, 2, 3, 4, 5)
+) -> Codebook:
     """The codebook of a table without a manifest; names come in order of first appearance and are
-    their own labels.
+    their own labels. ratings: the levels of the self-rating.
     """
     seen = tuple(dict.fromkeys(framings))
     known = tuple(name for name in KNOWN_FRAMINGS if name in seen)
@@ -130,6 +133,8 @@ def from_table(framings: Iterable[str], techniques: Iterable[str]) -> Codebook:
         techniques=tuple(dict.fromkeys(techniques)),
         order_rule="first appearance in the table",
         framing_rule=rule,
+        familiarity=FAMILIARITY if ratings == (1, 2, 3, 4, 5) else tuple(map(str, ratings)),
+        ratings=ratings,
     )
 
 
@@ -165,14 +170,7 @@ def read_manifest(path: str | Path) -> Codebook:
             f"{path}: study is {study!r:.60}, expected a table with framings and techniques"
         )
     framings, techniques = (_named(path, study, key) for key in ("framings", "techniques"))
-    rating = study.get("familiarity")
-    levels = rating.get("labels") if isinstance(rating, dict) else None
-    if levels is not None and not (
-        isinstance(levels, list)
-        and len(levels) == 5
-        and all(isinstance(text, str) for text in levels)
-    ):
-        raise InputError(f"{path}: study.familiarity.labels is {levels!r:.60}, expected five texts")
+    labels, ratings = _self_rating(path, study)
     return Codebook(
         framings=tuple(framings),
         techniques=tuple(techniques),
@@ -182,9 +180,42 @@ def read_manifest(path: str | Path) -> Codebook:
         | {("technique", name): label for name, label in techniques.items()}
         | _further(study),
         factors=tuple(factor["name"] for factor in study.get("factors") or []),
-        familiarity=FAMILIARITY if levels is None else tuple(levels),
+        familiarity=labels,
+        ratings=ratings,
         title=str(study.get("title") or study.get("name") or ""),
     )
+
+
+def _self_rating(path: Path, study: dict) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Labels and levels of the study's self-rating: `familiarity.labels`, from 2 on, and
+    `familiarity.levels`, whole numbers that ascend; without levels they count from 1.
+    """
+    rating = study.get("familiarity")
+    rating = rating if isinstance(rating, dict) else {}
+    labels, levels = rating.get("labels"), rating.get("levels")
+    if labels is None and levels is None:
+        return FAMILIARITY, tuple(range(1, len(FAMILIARITY) + 1))
+    if labels is not None and not (
+        isinstance(labels, list)
+        and len(labels) >= 2
+        and all(isinstance(text, str) for text in labels)
+    ):
+        raise InputError(
+            f"{path}: study.familiarity.labels is {labels!r:.60}, expected texts, two or more"
+        )
+    levels = list(range(1, len(labels) + 1)) if levels is None else levels
+    labels = list(map(str, levels)) if labels is None else labels
+    if not (
+        isinstance(levels, list)
+        and all(isinstance(one, int) and not isinstance(one, bool) for one in levels)
+        and levels == sorted(set(levels))
+        and len(levels) == len(labels)
+    ):
+        raise InputError(
+            f"{path}: study.familiarity.levels is {levels!r:.60}, expected whole numbers that "
+            "ascend, one for each label"
+        )
+    return tuple(labels), tuple(levels)
 
 
 def _further(study: dict) -> dict[tuple[str, str], str]:

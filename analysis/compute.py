@@ -36,6 +36,8 @@ what the levels hold, under the name 'all'.
     trend           statistic,value,low,high,p
                     preference against distance
     agreement       framing,statistic,value,low,high,p
+    side_balance    framing,technique,left,right,left_share,p,holm_p
+                    on which side each technique stood
     participants    participant,familiarity,answers,left,none,right,side_p,same_answer_share,
                     median_rt_ms,circular_triads,zeta,repeats,repeat_share,agreement_with_others,
                     excluded
@@ -88,6 +90,7 @@ def everything(responses: Responses, options: Options | None = None) -> Results:
         "pairs": inference.pairs(responses, options),
         "trend": inference.trend(responses, options),
         "agreement": agreement.agreement(responses, options),
+        "side_balance": agreement.side_balance(responses, options),
         "participants": agreement.participants(responses, options),
         "sensitivity": agreement.sensitivity(responses, options),
         "familiarity_interaction": inference.familiarity_interaction(responses, options),

@@ -16,9 +16,10 @@ import numpy as np
 import pandas as pd
 
 from analysis.codebook import Codebook
+from analysis.inference import alpha_of, verdict
 from analysis.options import OVERALL, Options
-from analysis.shown import alpha_of, number, probability
-from analysis.worth_figures import framing_label, verdict
+from analysis.shown import number, probability
+from analysis.worth_figures import framing_label
 
 SPOKEN = {
     "bradley_terry": "Bradley and Terry's model",
@@ -60,6 +61,7 @@ def conclude(
         )
     _about_trend(found, tables["trend"], codebook, alpha)
     _about_agreement(found, tables["agreement"], codebook, alpha, who.capitalize())
+    _about_sides(found, tables, notes, codebook, alpha, who.capitalize())
     _about_familiarity(found, tables["familiarity_interaction"], codebook, alpha)
     _about_exclusions(found, tables["participants"], tables["sensitivity"], people)
     _about_fits(found, notes.get("worths", ()), codebook)
@@ -213,25 +215,60 @@ def _about_agreement(
             f"Whether {who.lower()} agree with each other more than chance would: Kendall's u "
             f"is {listed(agree[False])}."
         )
-    side = rows[rows.index.get_level_values("statistic") == "left_share"] if len(rows) else rows
-    leaning = [
-        (framing, one)
-        for (framing, _), one in side.iterrows()
-        if np.isfinite(one.p) and one.p <= alpha
+
+
+def _about_sides(
+    found: Conclusions,
+    tables: Mapping[str, pd.DataFrame],
+    notes: Mapping[str, tuple[str, ...]],
+    codebook: Codebook,
+    alpha: float,
+    who: str,
+) -> None:
+    """Whether people lean to one side, and whether sides were shuffled against it."""
+    balance = tables["side_balance"]
+    uneven = balance[balance.holm_p <= alpha]
+    agreement = tables["agreement"]
+    leaning = agreement[
+        (agreement.statistic == "left_share")
+        & (agreement.framing != OVERALL)
+        & (agreement.p <= alpha)
     ]
-    if leaning:
+    confounded = [line.partition(": ") for line in notes.get("side_balance", ())]
+    for framing, _, reason in confounded:
+        found.cannot.append(
+            f"{framing_label(codebook, framing)}: what is preferred and which side is preferred "
+            f"cannot be told apart: {_with_labels(reason, codebook)}."
+        )
+    if len(leaning):
         words = listed(
             [
-                (
-                    f"{100 * one.value:.0f} % at {framing_label(codebook, framing)} (p "
-                    f"{_equals(one.p)})"
-                )
-                for framing, one in leaning
+                f"{100 * row.value:.0f} % at {framing_label(codebook, row.framing)} (p "
+                f"{_equals(row.p)})"
+                for row in leaning.itertuples()
             ]
         )
-        found.can.append(
-            f"{who} lean to one side: of their preferences, the left image got {words}; sides "
-            "were shuffled against that."
+        words = f"{who} lean to one side: of their preferences, the left image got {words}"
+        if uneven.empty:
+            low, high = 100 * balance.left_share.min(), 100 * balance.left_share.max()
+            found.can.append(
+                f"{words}; sides are balanced against that: each technique stood on the left in "
+                f"{low:.0f} to {high:.0f} % of its answers."
+            )
+        elif not confounded:
+            found.can.append(f"{words}; sides are not balanced against that.")
+    if len(uneven) and not confounded:
+        named = listed(
+            [
+                f"{codebook.label(row.technique)} on the left in {100 * row.left_share:.0f} % at "
+                f"{framing_label(codebook, row.framing)}"
+                for row in uneven.head(MOST).itertuples()
+            ]
+        )
+        more = f", and {len(uneven) - MOST} more" if len(uneven) > MOST else ""
+        found.cannot.append(
+            f"Sides were not shuffled evenly (binomial tests, Holm's correction): {named}{more}; "
+            "a preference for a side passes for one for a technique there."
         )
 
 
@@ -313,17 +350,22 @@ def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) 
         framing, _, model = head.rpartition(", ")
         if mark:
             models.setdefault((framing, reason.rstrip(".")), []).append(SPOKEN.get(model, model))
+    for (framing, reason), names in models.items():
+        found.cannot.append(
+            f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: "
+            f"{_with_labels(reason, codebook)}."
+        )
+
+
+def _with_labels(text: str, codebook: Codebook) -> str:
+    """The text with techniques' labels for their names."""
     labels = {name: codebook.label(name) for name in codebook.techniques}
-    words = re.compile(
+    names = re.compile(
         "|".join(
             rf"(?<!\w){re.escape(name)}(?!\w)" for name in sorted(labels, key=len, reverse=True)
         )
     )
-    for (framing, reason), names in models.items():
-        spoken = words.sub(lambda found: labels[found[0]], reason)
-        found.cannot.append(
-            f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: {spoken}."
-        )
+    return names.sub(lambda match: labels[match[0]], text)
 
 
 def listed(names: list[str]) -> str:

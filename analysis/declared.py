@@ -10,6 +10,7 @@ defaults; a rule that is false is off.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import fields
@@ -49,11 +50,19 @@ def options(
     rules = values.pop("exclusions", {})
     if not isinstance(rules, Mapping):
         raise InputError(f"{source}.exclusions is {rules!r:.60}, expected a table")
+    names = [
+        name
+        for name in declared
+        if name != "exclusions" and given.get(name) in (None, declared[name])
+    ]
+    named = (*names, *(f"exclusions.{name}" for name in rules))
     for name, table, known in (
         (source, values, Options),
         (f"{source}.exclusions", rules, Exclusions),
     ):
-        names = [field.name for field in fields(known) if field.name != "exclusions"]
+        names = [
+            field.name for field in fields(known) if field.name not in ("exclusions", "declared")
+        ]
         unknown = [key for key in table if key not in names]
         if unknown:
             raise InputError(
@@ -74,4 +83,17 @@ def options(
     if isinstance(values.get("models"), list):
         values["models"] = tuple(values["models"])
     rules = {key: None if value is False else value for key, value in rules.items()}
-    return Options(**values, exclusions=Exclusions(**rules))
+    return Options(**values, exclusions=Exclusions(**rules), declared=named)
+
+
+def fingerprint(declared: Mapping[str, object]) -> str:
+    """SHA-256 of what a study declares of its analysis, as hexadecimal digits.
+
+    Of its JSON with sorted keys and no spaces, so that neither the order of the keys nor the layout
+    of the file changes it: published before the data, it shows that the plan is the one that was
+    carried out. '' where nothing is declared.
+    """
+    if not declared:
+        return ""
+    text = json.dumps(declared, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()

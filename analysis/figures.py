@@ -238,12 +238,13 @@ def _value(ax: Axes, x: float, y: float, text: str) -> None:
 
 
 def _familiarity(table: pd.DataFrame) -> Figure:
-    figure, (ax,) = _panels(1, 1, 2.0, NARROW_IN)
-    ax.barh(table.level, table.participants, height=0.66, color=BLUE)
-    for level, count in zip(table.level, table.participants, strict=True):
-        _value(ax, count, level, f"{count}")
-    ax.set_yticks(table.level, [_wrapped(label, 18) for label in table.label])
-    ax.set_ylim(5.5, 0.5)
+    figure, (ax,) = _panels(1, 1, 0.6 + 0.28 * len(table), NARROW_IN)
+    places = range(len(table))
+    ax.barh(places, table.participants, height=0.66, color=BLUE)
+    for place, count in zip(places, table.participants, strict=True):
+        _value(ax, count, place, f"{count}")
+    ax.set_yticks(places, [_wrapped(label, 18) for label in table.label])
+    ax.set_ylim(len(table) - 0.5, -0.5)
     ax.set_xlim(0, max(table.participants.max(), 1) * 1.15)
     ax.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     ax.grid(axis="x")

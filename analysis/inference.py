@@ -151,6 +151,28 @@ def pairs(responses: Responses, options: Options) -> pd.DataFrame:
     return table
 
 
+def alpha_of(options: Options) -> float:
+    """The level of a test that goes with the level of the intervals: 0.05 with 95 %."""
+    return round(1 - options.level, 10)
+
+
+def verdict(row: object, alpha: float) -> str:
+    """What a row of `pairs` comes to: 'different', 'equivalent', 'both' or 'undecided'; both tests
+    are taken after Holm's correction.
+
+    Equivalent: within the margin by the interval (`equivalent`) and by both one-sided tests. Where
+    a margin was declared in JOD alone there is no such test, and the interval decides.
+    """
+    differs = row.holm_p <= alpha
+    if np.isfinite(row.equivalent):
+        equal = row.equivalent == 1 and row.tost_holm_p <= alpha
+    else:
+        equal = row.jod_equivalent == 1
+    if differs and equal:
+        return "both"
+    return "different" if differs else "equivalent" if equal else "undecided"
+
+
 def preferences(panel: Panel) -> np.ndarray:
     """(P, n (n - 1)/2): each participant's preference about each pair, -2 to 2, the mean where
     asked at several framings, else NaN.
@@ -287,8 +309,8 @@ def trend(responses: Responses, options: Options) -> pd.DataFrame:
 
 
 def familiarity_interaction(responses: Responses, options: Options) -> pd.DataFrame:
-    """framing, technique, n, slope, low, high, spearman, p, holm_p, detectable: does familiarity (1
-    to 5) change what is preferred?
+    """framing, technique, n, slope, low, high, spearman, p, holm_p, detectable: does the rating of
+    one's own familiarity go with what is preferred?
 
     slope       of a participant's net score for the technique (points for it less points against
                 it, an answer, -2 to 2) a level
@@ -313,15 +335,18 @@ def familiarity_interaction(responses: Responses, options: Options) -> pd.DataFr
         "detectable",
     ]
     rows, notes = [], []
-    level = responses.frame.drop_duplicates("participant").set_index("participant").familiarity
     rng = np.random.default_rng([options.seed, 1])
     for name, panel in panels(responses).items():
         net, asked = net_scores(panel)
-        here = (asked > 0).all(axis=1)
-        x = level.reindex(panel.participants[here]).to_numpy(float)
+        rating = responses.ratings.reindex(panel.participants).to_numpy(float)
+        here = (asked > 0).all(axis=1) & np.isfinite(rating)
+        x = rating[here]
         if here.sum() < FEWEST_PEOPLE or x.std() == 0:
             alike = f"all rated their familiarity {x[0]:.0f}" if here.sum() >= FEWEST_PEOPLE else ""
-            few = f"{here.sum()} participants judged every technique, expected {FEWEST_PEOPLE}"
+            few = (
+                f"{here.sum()} participants rated themselves and judged every technique, expected "
+                f"{FEWEST_PEOPLE}"
+            )
             notes.append(f"{name}: {alike or few}: nothing can be said of familiarity")
             continue
         y = net[here] / asked[here]

@@ -5,14 +5,16 @@ seed.
 from __future__ import annotations
 
 import platform
+import re
 from collections.abc import Mapping
 from importlib import metadata
 
+from analysis.agreement import rules_in_words
 from analysis.codebook import FRAMING
 from analysis.conclusions import count
+from analysis.inference import alpha_of
 from analysis.options import Options
 from analysis.responses import Responses
-from analysis.shown import alpha_of
 from analysis.worth import FEW_ANSWERS, NO_TASTE, QUADRATURE_ITEMS
 
 #: Key -> reference, as it is cited.
@@ -89,25 +91,35 @@ def versions() -> dict[str, str]:
     return found
 
 
-def exclusions(options: Options) -> list[str]:
-    """The declared rules, in words; empty where all are off."""
-    rules = options.exclusions
-    words = {
-        "answered_share": "answered less than {:.0%} of the questions",
-        "one_side_share": (
-            "preferred one side in at least {:.0%} of decided answers, where "
-            "that is unlikely by chance (p < 0.001)"
-        ),
-        "median_rt_ms": "took less than {:g} ms for half of the answers",
-        "same_answer_share": "gave one and the same answer at least {:.0%} of the time",
-        "zeta": "had a coefficient of consistency below {:g}",
-        "repeat_share": "chose the same direction less than {:.0%} of the time when asked again",
-    }
-    return [
-        text.format(getattr(rules, name)).replace("%", " %")
-        for name, text in words.items()
-        if getattr(rules, name) is not None
-    ]
+def rejected_rows(responses: Responses) -> str:
+    """How many rows are not counted, and why, in words: a count for each reason."""
+    if not responses.findings:
+        return "every row of the table was used"
+    kinds: dict[str, int] = {}
+    for one in responses.findings:
+        reason = {
+            "duplicate": "the person had answered that question already",
+            "no level": "the person has no level to group by",
+        }.get(one.kind)
+        if reason is None:  # 'answer is '7', expected ...; left is ...': by what is first
+            reason = re.sub(r" is '.*?', expected ", " is not ", one.reason.split("; ")[0])
+        kinds[reason] = kinds.get(reason, 0) + 1
+    listed = "; ".join(f"{number}: {reason}" for reason, number in kinds.items())
+    return f"{count(len(responses.findings), 'row')} of the table could not be used ({listed})"
+
+
+def missing_values(responses: Responses) -> str:
+    """What is missing beside answers that are counted, in words; '' where nothing is."""
+    kinds: dict[str, list[str]] = {}
+    for one in responses.missing:
+        kinds.setdefault(one.column, []).append(one.expected)
+    if not kinds:
+        return ""
+    listed = ", ".join(
+        f"{column} in {count(len(expected), 'answer')} (not {expected[0]})"
+        for column, expected in kinds.items()
+    )
+    return f"Missing, with the answer counted: {listed}. "
 
 
 def paragraphs(responses: Responses, options: Options, declared: str) -> list[tuple[str, str]]:
@@ -125,12 +137,7 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
     names = ", ".join(
         responses.codebook.label(name) for name in responses.codebook.techniques if name in present
     )
-    unused = len(responses.findings)
-    rows = (
-        "every row of the table was used"
-        if not unused
-        else f"{count(unused, 'row')} of the table could not be used"
-    )
+    rows = rejected_rows(responses)
     together = options.family == "study"
     family = f"all {codebook.levels} together" if together else f"each {codebook.level}"
     found = [
@@ -143,6 +150,7 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             "answered on a scale from \N{MINUS SIGN}2 (strong preference for the left image) "
             "over 0 (no difference seen) to 2 (strong "
             f"preference for the right one). {len(frame)} answers were analysed; {rows}. "
+            f"{missing_values(responses)}"
             "Sides and order were as the table gives them; answers were turned to the pair "
             "before anything was computed.",
         ),
@@ -218,11 +226,9 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
         ),
         (
             "Exclusions",
-            (
-                "Everyone is counted. Every conclusion was computed again without those who "
-                f"{'; or '.join(exclusions(options))} ({declared})."
-            )
-            if exclusions(options)
+            "Everyone is counted. Every conclusion was computed again without those whom the rules "
+            f"of exclusion name: {rules}."
+            if (rules := rules_in_words(options)) != "none"
             else f"Everyone is counted; no rule of exclusion was declared ({declared}).",
         ),
         (

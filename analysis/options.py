@@ -60,6 +60,8 @@ class Options:
                 'drop'
     models      the models of worth to fit
     exclusions  see `Exclusions`
+    declared    names of the choices that a study declared, rules as 'exclusions.NAME'; the others
+                are defaults or were given later
     """
 
     resamples: int = 1000
@@ -72,6 +74,7 @@ class Options:
     ties: str = "half"
     models: tuple[str, ...] = ("bradley_terry", "davidson", "thurstone_jod", "ordinal")
     exclusions: Exclusions = field(default_factory=Exclusions)
+    declared: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, least in (("resamples", 100), ("seed", 0)):

@@ -36,6 +36,8 @@ from analysis.conclusions import count as _count
 from analysis.conclusions import listed as _listed
 from analysis.declared import UNDECLARED
 from analysis.errors import InputError
+from analysis.inference import alpha_of
+from analysis.methods import rejected_rows
 from analysis.methods import versions as _versions
 from analysis.objective import Measured
 from analysis.options import Options
@@ -92,6 +94,10 @@ def report_responses(
             ],
             columns=["line", "last_line", "kind", "reason", "row"],
         ),
+        "missing_values": pd.DataFrame(
+            [(one.line, one.column, one.value, one.expected) for one in responses.missing],
+            columns=["line", "column", "value", "expected"],
+        ),
     } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
     results = compute.everything(responses, options)
     tables |= results.tables
@@ -113,7 +119,7 @@ def report_responses(
     if responses.simulated:
         tables = {name: table.assign(simulated=1) for name, table in tables.items()}
 
-    simulated, alpha = responses.simulated, shown.alpha_of(options)
+    simulated, alpha = responses.simulated, alpha_of(options)
     pictures = worth_figures.draw_results(
         results.tables, codebook, options.margin, alpha, simulated
     )
@@ -125,6 +131,7 @@ def report_responses(
         said = objective.sentences(beside, correlated, measured.notes, codebook)
     pictures += figures.draw_responses(responses, found, pair, slugs)
     read = shown.all_shown(results.tables, codebook, options)
+    read |= {one.name: one for one in shown.not_counted(responses) if one.rows}
     concluded = conclusions.conclude(
         results.tables, results.notes, codebook, options, responses.participants, simulated
     )
@@ -158,10 +165,6 @@ def report_responses(
             title, subtitle, summary, pictures, list(read.values()), numbered, references, simulated
         ),
     }
-    first, last = (
-        f"{time:%Y-%m-%d}"
-        for time in (responses.frame.started_at.min(), responses.frame.started_at.max())
-    )
     return _files(
         tables,
         pictures,
@@ -205,8 +208,7 @@ def report_responses(
         notes=responses.notes,
         findings=responses.findings[:SHOWN_ROWS],
         rows=responses.rows,
-        period=f"on {first}" if first == last else f"from {first} to {last}",
-        seconds=float(responses.frame.rt_ms.median()) / 1000,
+        when=_when(responses),
         source=responses.source,
         sha256=responses.sha256,
         command=command,
@@ -336,6 +338,20 @@ def _files(
     return files
 
 
+def _when(responses: Responses) -> str:
+    """When answers were given and how long half of them took; '' where nothing is known."""
+    begun, rt_ms = responses.frame.started_at, responses.frame.rt_ms
+    words = []
+    if begun.notna().any():
+        first, last = (f"{time:%Y-%m-%d}" for time in (begun.min(), begun.max()))
+        when = f"on {first}" if first == last else f"from {first} to {last}"
+        words.append(f"Answers were given {when}")
+    if rt_ms.notna().any():
+        words.append(f"half of them took less than {rt_ms.median() / 1000:.1f} s")
+    text = "; ".join(words)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
 def _pdf(*parts: object) -> bytes:
     from analysis import pdf
 
@@ -429,13 +445,20 @@ def _summary(
     people = _count(
         responses.participants, "simulated participant" if responses.simulated else "participant"
     )
-    unused = f"{_count(len(responses.findings), 'row')} of the table could not be used; see below."
+    unused = f"{rejected_rows(responses)[:1].upper()}{rejected_rows(responses)[1:]}."
     sentences.append(
         (
             f"{people} gave {_count(len(frame), 'answer')} at "
             f"{codebook.counted(len(responses.items))}. "
         )
         + (unused if responses.findings else "Every row of the table is counted.")
+        + (
+            f" {_count(len(responses.missing), 'value')} beside answers "
+            f"{'is' if len(responses.missing) == 1 else 'are'} missing ({_missing(responses)}); "
+            "their answers are counted."
+            if responses.missing
+            else ""
+        )
     )
     for framing, rows in scores.groupby("framing", sort=False):
         points = dict(zip(rows.technique, rows.score, strict=True))
@@ -504,6 +527,12 @@ def _summary(
         f"{_count(sides.none.sum(), 'time')}."
     )
     return sentences
+
+
+def _missing(responses: Responses) -> str:
+    """'familiarity 12, rt_ms 1'."""
+    columns = [one.column for one in responses.missing]
+    return ", ".join(f"{name} {columns.count(name)}" for name in dict.fromkeys(columns))
 
 
 def _first(values: Mapping[str, float], codebook: Codebook) -> list[str]:

@@ -1,14 +1,14 @@
 """Reads a table of answers, one row a trial, and makes it tidy. Nothing is dropped in silence.
 
-A row that cannot be used becomes a `Finding` with its line number and its reason; a fault of the
-whole file is an InputError.
+Only what identifies or values an answer can cost it: participant, framing (and what the study
+varies beside it), left, right, answer, simulated. Such a row becomes a `Finding` with its line
+number and its reason. What is measured beside the answer (`MEASURED`) may be missing: the answer
+counts, the value is a `Missing` with line and reason. A fault of the whole file is an InputError.
 """
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,20 +18,19 @@ import numpy as np
 import pandas as pd
 
 from analysis import codebook as codebooks
+from analysis import delimited
 from analysis.codebook import FRAMING, Codebook
 from analysis.errors import InputError
 from analysis.options import FEWEST_PEOPLE
 
+#: Columns that identify an answer or value it; without them it cannot be counted.
+IDENTIFYING = ("participant", "framing", "left", "right", "answer")
+#: Columns of what was measured beside an answer; each may be empty, or not be there at all.
+MEASURED = ("familiarity", "order", "rt_ms", "started_at")
+#: The columns of responses.csv that the analysis reads, in their usual order.
 REQUIRED = (
-    "participant",
-    "familiarity",
-    "framing",
-    "left",
-    "right",
-    "answer",
-    "order",
-    "rt_ms",
-    "started_at",
+    *("participant", "familiarity", "framing", "left", "right", "answer"),
+    *("order", "rt_ms", "started_at"),
 )
 OPTIONAL = ("simulated", "study", "study_version")
 REPEATS = ("participant", "framing", "a", "b", "preference", "first_preference")
@@ -41,8 +40,8 @@ NO_FACTOR = ("participant", "left", "right", "answer", "order", "rt_ms", "starte
 #: no group.
 MOST_LEVELS, MOST_NUMBERS = 30, 10
 
-_INTEGER = r"[+-]?[0-9]{1,9}(?:\.0*)?"
-_NUMBER = r"\+?[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,2})?"
+#: Where no study declares the levels of its self-rating, these are taken for ratings.
+UNDECLARED_RATINGS = (0, 10)
 
 
 @dataclass(frozen=True)
@@ -68,12 +67,25 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Missing:
+    """A value that is not there or not readable; its answer is counted all the same.
+
+    `value` is the cell as written, '' where it is empty.
+    """
+
+    line: int
+    column: str
+    value: str
+    expected: str
+
+
+@dataclass(frozen=True)
 class Responses:
     """A tidy table of answers and what is known about it.
 
     frame has one row an answer:
         participant     category
-        familiarity     int8, 1 to 5
+        familiarity     float64, one of `codebook.ratings`, NaN where it is missing
         framing         ordered category, in the order of the codebook; with another factor than
                         'framing', its level
         image_framing   ordered category: the framing of the images, whatever the factor; with
@@ -84,12 +96,15 @@ class Responses:
         winner          ordered category: the preferred technique, missing where strength is 0
         a_left          bool: a was shown on the left
         answer          int8, -2 to 2, as given: negative prefers the left image
-        order           int32, 1 is the first question
-        rt_ms           float64, milliseconds
-        started_at      datetime, UTC
+        order           float64, 1 is the first question, NaN where it is missing
+        rt_ms           float64, milliseconds, NaN where it is missing
+        started_at      datetime, UTC, NaT where it is missing
         line            int64, where the row begins in the file
 
     grouping says, where the factor is not 'framing', what its levels hold; notes begin with it.
+
+    missing has one entry for each value of `MEASURED` that is not there; findings one for each row
+    that is not counted.
 
     repeats has one row for each question that a participant was asked again (the same pair under
     another `order`; it is not counted):
@@ -100,6 +115,7 @@ class Responses:
     frame: pd.DataFrame
     codebook: Codebook
     findings: tuple[Finding, ...] = ()
+    missing: tuple[Missing, ...] = ()
     notes: tuple[str, ...] = ()
     simulated: bool = False
     rows: int = 0
@@ -123,6 +139,11 @@ class Responses:
     def participants(self) -> int:
         return self.frame.participant.nunique()
 
+    @cached_property
+    def ratings(self) -> pd.Series:
+        """Participant -> their first self-rating of familiarity, NaN where they gave none."""
+        return self.frame.groupby("participant", observed=True).familiarity.first()
+
 
 def read_responses(
     path: str | Path,
@@ -130,7 +151,7 @@ def read_responses(
     order: Iterable[str] | None = None,
     factor: str = FRAMING,
 ) -> Responses:
-    """Read responses.csv (UTF-8 with or without BOM, comma separated).
+    """Read responses.csv, in any dialect that `analysis.delimited` knows.
 
     See `Responses` for what comes out.
 
@@ -148,10 +169,9 @@ def read_responses(
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     further = codebook.factors if codebook else ()
-    raw, lines, findings = _parse(str(path), data, factor, further)
-    return _tidy(
-        str(path), raw, lines, findings, codebook, order, factor, hashlib.sha256(data).hexdigest()
-    )
+    raw, lines, findings, dialect = _parse(str(path), data, factor, further)
+    digest = hashlib.sha256(data).hexdigest()
+    return _tidy(str(path), raw, lines, findings, codebook, order, factor, digest, dialect)
 
 
 def responses_from_records(
@@ -165,9 +185,9 @@ def responses_from_records(
     """
     _allowed(factor)
     raw = pd.DataFrame.from_records(list(records))
-    missing = [name for name in REQUIRED if name not in raw]
-    if missing:
-        raise InputError(f"the records lack {', '.join(missing)}; expected {', '.join(REQUIRED)}")
+    absent = [name for name in IDENTIFYING if name not in raw]
+    if absent:
+        raise InputError(f"the records lack {', '.join(absent)}; expected {', '.join(REQUIRED)}")
     if factor not in raw:
         raise InputError(_lacking(factor, raw))
     blank = raw[factor].isna() & (factor not in REQUIRED)
@@ -179,7 +199,8 @@ def responses_from_records(
     )
     raw["level"] = raw[factor].str.strip().mask(blank, "")
     raw["line"] = raw["last_line"] = np.arange(1, len(raw) + 1)
-    lines = [",".join(values) for values in raw[list(REQUIRED)].to_numpy()]
+    there = [name for name in REQUIRED if name in raw]
+    lines = [",".join(values) for values in raw[there].to_numpy()]
     return _tidy("the records", raw, lines, [], codebook, order, factor, "")
 
 
@@ -200,73 +221,28 @@ def _lacking(factor: str, columns: Iterable[str]) -> str:
 
 def _parse(
     name: str, data: bytes, factor: str, further: tuple[str, ...] = ()
-) -> tuple[pd.DataFrame, list[str], list[Finding]]:
+) -> tuple[pd.DataFrame, list[str], list[Finding], delimited.Rows]:
     """The cells as text, with line and last_line; the lines of the file; findings for rows without
-    the header's fields.
+    the header's fields; how the text was read.
     """
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
+    rows = delimited.read(name, data, (*REQUIRED, *OPTIONAL, factor, *further))
+    absent = [column for column in IDENTIFYING if column not in rows.header]
+    if absent:
         raise InputError(
-            f"{name}: line {line}: byte 0x{data[error.start]:02x} is not UTF-8; save the "
-            "table as 'CSV UTF-8'"
-        ) from None
-    if not text.strip():
-        raise InputError(f"{name}: is empty, expected a header and one row an answer")
-    lines = list(io.StringIO(text, newline=""))
-    reader = csv.reader(iter(lines), strict=True)
-    try:
-        header = [cell.strip() for cell in next(reader)]
-    except csv.Error as error:
-        raise InputError(f"{name}: line 1: the header is no CSV: {error}") from None
-    missing = [column for column in REQUIRED if column not in header]
-    if missing:
-        hint = next((f"; is it separated by {mark!r}?" for mark in ";\t" if mark in lines[0]), "")
-        raise InputError(
-            f"{name}: has no column {', '.join(missing)}{hint}; expected {','.join(REQUIRED)}"
+            f"{name}: has no column {', '.join(absent)}; expected {','.join(REQUIRED)}"
         )
-    if factor not in header:
-        raise InputError(f"{name}: {_lacking(factor, header)}")
-    wanted = [
-        column
-        for column in dict.fromkeys((*REQUIRED, *OPTIONAL, factor, *further))
-        if column in header
+    if factor not in rows.header:
+        raise InputError(f"{name}: {_lacking(factor, rows.header)}")
+    findings = [
+        _finding(first, last, "malformed", reason, rows.lines)
+        for first, last, reason in rows.faults
     ]
-    twice = [column for column in wanted if header.count(column) > 1]
-    if twice:
-        raise InputError(f"{name}: has the column {', '.join(twice)} twice")
-
-    places = [header.index(column) for column in wanted]
-    cells: list[tuple[str, ...]] = []
-    spans: list[tuple[int, int]] = []
-    findings: list[Finding] = []
-    while True:
-        first = reader.line_num + 1
-        try:
-            row = next(reader)
-            fault = f"has {len(row)} fields, expected {len(header)} as in the header"
-        except StopIteration:
-            break
-        except csv.Error as error:
-            row, fault = None, f"is no CSV: {error}"
-            if reader.line_num >= len(lines) and "unexpected end" in str(error):
-                raise InputError(
-                    f"{name}: line {first}: a quotation mark is opened and never closed"
-                ) from None
-        if row == []:
-            continue
-        if row is not None and len(row) == len(header):
-            cells.append(tuple(row[place].strip() for place in places))
-            spans.append((first, reader.line_num))
-        else:
-            findings.append(_finding(first, reader.line_num, "malformed", fault, lines))
-    if not cells and not findings:
+    if not rows.cells and not findings:
         raise InputError(f"{name}: has a header and no rows, expected one row an answer")
-    raw = pd.DataFrame(cells, columns=wanted, dtype=object)
+    raw = pd.DataFrame(rows.cells, columns=list(rows.columns), dtype=object)
     raw["level"] = raw[factor]
-    raw["line"], raw["last_line"] = np.array(spans, dtype=np.int64).reshape(-1, 2).T
-    return raw, lines, findings
+    raw["line"], raw["last_line"] = np.array(rows.spans, dtype=np.int64).reshape(-1, 2).T
+    return raw, rows.lines, findings, rows
 
 
 def _finding(first: int, last: int, kind: str, reason: str, lines: list[str]) -> Finding:
@@ -284,9 +260,15 @@ def _tidy(
     order: Iterable[str] | None,
     factor: str,
     sha256: str,
+    dialect: delimited.Rows | None = None,
 ) -> Responses:
     rows = len(raw) + len(findings)
-    values, reasons = _checked(raw, codebook, factor)
+    columns = tuple(column for column in MEASURED if column not in raw)
+    for column in columns:
+        raw[column] = ""
+    values, understood = _values(raw, dialect.separator if dialect else ",")
+    ratings, rule = _ratings(values.familiarity, codebook)
+    reasons, missing = _checked(raw, values, codebook, factor, ratings, rule, columns)
     simulated = _one_kind(name, raw)
     findings = findings + [
         _finding(raw.line[at], raw.last_line[at], "malformed", _some(reasons[at], 3, "; "), lines)
@@ -306,7 +288,9 @@ def _tidy(
         raise InputError(f"{name}: none of its {rows} rows can be used; {first}")
 
     if codebook is None:
-        codebook = codebooks.from_table(frame.framing, frame[["left", "right"]].to_numpy().ravel())
+        codebook = codebooks.from_table(
+            frame.framing, frame[["left", "right"]].to_numpy().ravel(), ratings
+        )
     if order is not None:
         present = set(frame.left) | set(frame.right)
         codebook = codebook.ordered(
@@ -317,11 +301,12 @@ def _tidy(
     if factor != FRAMING:
         level = raw.level.drop(index=list(reasons))
         if factor == "familiarity":
-            level = (
-                frame.groupby("participant", observed=True)
-                .familiarity.transform("first")
-                .astype(str)
-            )
+            rated = frame.groupby("participant", observed=True).familiarity.transform("first")
+            frame, rated, unrated = _without_level(frame, rated, lines)
+            findings += unrated
+            if frame.empty:
+                raise InputError(f"{name}: nobody rated their familiarity; {unrated[0]}")
+            level = rated.map("{:g}".format)
         codebook = codebook.by(factor, *_levels(name, factor, level))
         frame["framing"] = pd.Categorical(level, codebook.framings, ordered=True)
     key = ["participant", "framing", "image_framing", "a", "b"]
@@ -334,9 +319,12 @@ def _tidy(
         )
         repeats = frame[again].merge(firsts, on=key)
         asked_again = {
-            "repeats": repeats.loc[repeats.order != repeats.first_order, list(REPEATS)].reset_index(
-                drop=True
-            )
+            "repeats": repeats.loc[
+                (repeats.order != repeats.first_order)
+                & repeats.order.notna()
+                & repeats.first_order.notna(),
+                list(REPEATS),
+            ].reset_index(drop=True)
         }
         findings += [
             _finding(
@@ -359,7 +347,14 @@ def _tidy(
         frame=frame,
         codebook=codebook,
         findings=tuple(sorted(findings, key=lambda finding: finding.line)),
-        notes=(*grouping, *_notes(frame, raw, codebook)),
+        missing=tuple(sorted(missing, key=lambda one: one.line)),
+        notes=(
+            *grouping,
+            *(dialect.notes if dialect else ()),
+            *([f"Understood in it: {'; '.join(understood)}."] if understood else []),
+            *_missing_notes(missing, columns, len(frame)),
+            *_notes(frame, raw, codebook),
+        ),
         grouping=grouping,
         simulated=simulated,
         rows=rows,
@@ -463,35 +458,57 @@ def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
         )
 
 
-def _checked(
-    raw: pd.DataFrame, codebook: Codebook | None, factor: str
-) -> tuple[pd.DataFrame, dict[int, list[str]]]:
-    """The numeric columns as numbers, and for each row that fails, by its position, why."""
-    values = pd.DataFrame(index=raw.index)
+def _values(raw: pd.DataFrame, separator: str) -> tuple[pd.DataFrame, list[str]]:
+    """The columns of numbers and times, missing where a cell is none; what was understood."""
+    values, understood = pd.DataFrame(index=raw.index), {}
     for column, pattern in (
-        ("familiarity", _INTEGER),
-        ("answer", _INTEGER),
-        ("order", _INTEGER),
-        ("rt_ms", _NUMBER),
+        ("familiarity", delimited.INTEGER),
+        ("answer", delimited.INTEGER),
+        ("order", delimited.INTEGER),
+        ("rt_ms", delimited.NUMBER),
     ):
-        values[column] = pd.to_numeric(
-            raw[column].where(raw[column].str.fullmatch(pattern)), errors="coerce"
-        )
-    values["started_at"] = pd.to_datetime(
-        raw.started_at, format="ISO8601", utc=True, errors="coerce"
-    )
+        parsed = delimited.numbers(raw[column], pattern, separator)
+        values[column] = parsed.values.where(np.isfinite(parsed.values))
+        understood |= dict.fromkeys(parsed.notes)
+    parsed = delimited.times(raw.started_at)
+    values["started_at"] = parsed.values
+    return values, [*understood, *parsed.notes]
 
+
+def _ratings(familiarity: pd.Series, codebook: Codebook | None) -> tuple[tuple[int, ...], str]:
+    """The levels of the self-rating, and what a rating must be, in words.
+
+    Where no study declares them they are those of the table: 1 to 5, or as far as its whole
+    numbers within `UNDECLARED_RATINGS` go.
+    """
+    if codebook is not None:
+        levels = codebook.ratings
+        return levels, f"a level of the study's self-rating, {levels[0]} to {levels[-1]}"
+    low, high = UNDECLARED_RATINGS
+    seen = familiarity[familiarity.between(low, high)]
+    first = int(min(1, seen.min())) if len(seen) else 1
+    last = int(max(5, seen.max())) if len(seen) else 5
+    return tuple(range(first, last + 1)), f"a whole number from {low} to {high}"
+
+
+def _checked(
+    raw: pd.DataFrame,
+    values: pd.DataFrame,
+    codebook: Codebook | None,
+    factor: str,
+    ratings: tuple[int, ...],
+    rating_rule: str,
+    absent: tuple[str, ...],
+) -> tuple[dict[int, list[str]], list[Missing]]:
+    """For each row that fails, by its position, why; and the values that are missing in the others.
+
+    Values outside their range become missing in place.
+    """
     checks = [
         (column, raw[column] == "", "a name")
         for column in ("participant", "framing", "left", "right")
     ]
-    checks += [
-        ("familiarity", ~values.familiarity.between(1, 5), "an integer from 1 to 5"),
-        ("answer", ~values.answer.between(-2, 2), "an integer from -2 to 2"),
-        ("order", ~(values.order >= 1), "an integer from 1"),
-        ("rt_ms", ~np.isfinite(values.rt_ms), "milliseconds, a number from 0"),
-        ("started_at", values.started_at.isna(), "a time in ISO 8601"),
-    ]
+    checks.append(("answer", ~values.answer.between(-2, 2), "an integer from -2 to 2"))
     if factor not in REQUIRED:
         checks.append(("level", raw.level == "", "a level to group answers by"))
     if "simulated" in raw:
@@ -516,7 +533,62 @@ def _checked(
         reasons.setdefault(at, []).append(
             f"left and right are both {raw.left[at]!r:.60}, expected two techniques"
         )
-    return values, reasons
+
+    missing = []
+    for column, readable, expected in (
+        ("familiarity", values.familiarity.isin(ratings), rating_rule),
+        ("order", values.order >= 1, "an integer from 1"),
+        ("rt_ms", values.rt_ms >= 0, "milliseconds, a number from 0"),
+        ("started_at", values.started_at.notna(), "a time in ISO 8601"),
+    ):
+        values[column] = values[column].where(readable)
+        if column not in absent:
+            missing += [
+                Missing(int(raw.line[at]), column, f"{raw[column][at]:.60}", expected)
+                for at in np.flatnonzero(~readable)
+                if at not in reasons
+            ]
+    return reasons, missing
+
+
+def _without_level(
+    frame: pd.DataFrame, rated: pd.Series, lines: list[str]
+) -> tuple[pd.DataFrame, pd.Series, list[Finding]]:
+    """The answers of people who rated themselves; findings for the others, who have no level when
+    answers are grouped by familiarity.
+    """
+    unrated = [
+        _finding(
+            row.line,
+            row.last_line,
+            "no level",
+            f"{row.participant!r} rated no familiarity, expected a level to group answers by",
+            lines,
+        )
+        for row in frame[rated.isna()].itertuples()
+    ]
+    return frame[rated.notna()], rated[rated.notna()], unrated
+
+
+def _missing_notes(missing: list[Missing], columns: tuple[str, ...], answers: int) -> Iterable[str]:
+    """How many values are missing of each column, and why, a sentence a column."""
+    for column in columns:
+        yield f"The table has no column {column}: nothing is said of it, and every answer counts."
+    for column in MEASURED:
+        here = [one for one in missing if one.column == column]
+        if not here:
+            continue
+        filled = [one for one in here if one.value]
+        first = (
+            f"the first is {filled[0].value!r} on line {filled[0].line}"
+            if filled
+            else f"the first is empty, on line {here[0].line}"
+        )
+        yield (
+            f"{column} is missing in {_plural(len(here), 'answer')} of {answers}, which "
+            f"{'is' if len(here) == 1 else 'are'} counted all the same: expected "
+            f"{here[0].expected}, {first}."
+        )
 
 
 def _one_kind(name: str, raw: pd.DataFrame) -> bool:
@@ -550,7 +622,7 @@ def _oriented(frame: pd.DataFrame, codebook: Codebook) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "participant": frame.participant.astype("category"),
-            "familiarity": frame.familiarity.astype(np.int8),
+            "familiarity": frame.familiarity.astype(float),
             "framing": pd.Categorical(frame.framing, codebook.framings, ordered=True),
             "image_framing": pd.Categorical(frame.image, _images(frame, codebook), ordered=True),
             "a": pd.Categorical.from_codes(a, dtype=techniques),
@@ -560,7 +632,7 @@ def _oriented(frame: pd.DataFrame, codebook: Codebook) -> pd.DataFrame:
             "winner": pd.Categorical.from_codes(winner, dtype=techniques),
             "a_left": a_left,
             "answer": frame.answer.astype(np.int8),
-            "order": frame.order.astype(np.int32),
+            "order": frame.order.astype(float),
             "rt_ms": frame.rt_ms.astype(float),
             "started_at": frame.started_at,
             "line": frame.line,

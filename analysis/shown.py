@@ -13,8 +13,10 @@ import numpy as np
 import pandas as pd
 
 from analysis.codebook import Codebook
+from analysis.inference import alpha_of, verdict
 from analysis.options import Options
-from analysis.worth_figures import DRAWN, MODELS, VERDICTS, framing_label, verdict
+from analysis.responses import Responses
+from analysis.worth_figures import DRAWN, MODELS, VERDICTS, framing_label
 
 #: Statistics of agreement.csv that are read, with their names.
 STATISTICS = DRAWN | {
@@ -325,9 +327,57 @@ def sensitivity(table: pd.DataFrame, codebook: Codebook) -> Shown:
     )
 
 
-def alpha_of(options: Options) -> float:
-    """The level of a test that goes with the level of the intervals: 0.05 with 95 %."""
-    return round(1 - options.level, 10)
+def sides(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            codebook.label(row.technique),
+            f"{row.left:g}",
+            f"{row.right:g}",
+            f"{100 * row.left_share:.0f} %",
+            probability(row.p),
+            probability(row.holm_p),
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "side_balance",
+        "On which side each technique stood",
+        (codebook.heading, "Technique", "Left", "Right", "Left share", "p", "Holm p"),
+        (False, False, *[True] * 5),
+        tuple(rows),
+        "Exact binomial tests of as often left as right; where sides are shuffled only chance "
+        "makes them uneven.",
+    )
+
+
+def not_counted(responses: Responses, most: int = 100) -> tuple[Shown, Shown]:
+    """Rows that are not counted, and values that are missing beside answers that are."""
+
+    def note(number: int, name: str) -> str:
+        return f"The first {most} of {number}; all are in tables/{name}.csv." * (number > most)
+
+    findings, missing = responses.findings, responses.missing
+    rows = Shown(
+        "rejected_rows",
+        f"Rows that are not counted: {len(findings)} of {responses.rows}",
+        ("Line", "Kind", "Reason"),
+        (True, False, False),
+        tuple((str(one.line), one.kind, one.reason) for one in findings[:most]),
+        note(len(findings), "rejected_rows"),
+    )
+    values = Shown(
+        "missing_values",
+        f"Values that are missing beside answers that are counted: {len(missing)}",
+        ("Line", "Column", "As written", "Expected"),
+        (True, False, False, False),
+        tuple(
+            (str(one.line), one.column, one.value or NOTHING, one.expected)
+            for one in missing[:most]
+        ),
+        note(len(missing), "missing_values"),
+    )
+    return rows, values
 
 
 def all_shown(
@@ -341,6 +391,7 @@ def all_shown(
         consistency(tables["ahp_consistency"], codebook),
         trend(tables["trend"]),
         agreement(tables["agreement"], codebook),
+        sides(tables["side_balance"], codebook),
         familiarity(tables["familiarity_interaction"], codebook),
         sensitivity(tables["sensitivity"], codebook),
     )

@@ -132,13 +132,20 @@ def sides(responses: Responses) -> pd.DataFrame:
 
 
 def familiarity(responses: Responses) -> pd.DataFrame:
-    """level (1 to 5), label, participants."""
-    rating = responses.frame.drop_duplicates("participant").familiarity
-    counts = rating.value_counts().reindex(range(1, 6), fill_value=0)
-    return pd.DataFrame(
+    """level, label, participants: one row a level of the self-rating, and one without a level for
+    those who gave no rating, where there are any.
+    """
+    codebook = responses.codebook
+    counts = responses.ratings.value_counts().reindex(codebook.ratings, fill_value=0)
+    table = pd.DataFrame(
         {
-            "level": counts.index,
-            "label": responses.codebook.familiarity,
+            "level": list(codebook.ratings),
+            "label": codebook.familiarity,
             "participants": counts.to_numpy(),
         }
     )
+    unrated = int(responses.ratings.isna().sum())
+    if unrated:
+        table = table.astype({"level": object})
+        table.loc[len(table)] = ["", "no rating", unrated]
+    return table

@@ -379,6 +379,8 @@ def missing_fit(panel: Panel, model: str) -> str | None:
             f"{panel.people} participants; what they share and what is their own needs "
             f"{FEWEST_PEOPLE}"
         )
+    if model == "ordinal" and (reason := confounded_side(panel)):
+        return reason
     edges = strict if model in ("bradley_terry", "thurstone_jod") else strict + level
     groups, label = csgraph.connected_components(edges > 0, directed=True, connection="strong")
     if groups > 1:
@@ -403,6 +405,25 @@ def missing_fit(panel: Panel, model: str) -> str | None:
             "end and only fit better"
         )
     return None
+
+
+def confounded_side(panel: Panel) -> str | None:
+    """Why a preference for a side cannot be told from one for a technique: every pair was shown one
+    way round only. None where some pair was shown both ways, or nobody answered twice.
+    """
+    shown, first_left = panel.answered.sum(axis=0), (panel.first_left & panel.answered).sum(axis=0)
+    if shown.max(initial=0) < 2 or ((first_left > 0) & (first_left < shown)).any():
+        return None
+    left = np.where(first_left > 0, panel.first, panel.second)
+    right = np.where(first_left > 0, panel.second, panel.first)
+    one_side = [
+        f"{item} was always on the {'left' if at in left else 'right'}"
+        for at, item in enumerate(panel.items)
+        if (at in left) != (at in right)
+    ]
+    return "side is confounded with technique: every pair was always shown the same way round" + (
+        f" ({'; '.join(one_side)})" if one_side else ""
+    )
 
 
 def _names(panel: Panel, chosen: np.ndarray) -> str:

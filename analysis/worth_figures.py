@@ -19,6 +19,7 @@ from matplotlib.ticker import MaxNLocator
 from analysis import figures
 from analysis.codebook import FRAMING, Codebook
 from analysis.figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
+from analysis.inference import verdict
 from analysis.options import OVERALL
 
 #: Model -> its name and the unit of its worths.
@@ -50,29 +51,6 @@ def framing_label(codebook: Codebook, name: str) -> str:
     if name == OVERALL:
         return "All framings" if codebook.factor == FRAMING else "All together"
     return codebook.framing_label(name)
-
-
-def verdict(row: object, alpha: float) -> str:
-    """What a row of pairs.csv comes to, as a key of `VERDICTS`; both tests are taken after Holm's
-    correction.
-
-    As good as each other: within the margin by the interval (`equivalent`) and by both one-sided
-    tests. Where a margin was declared in JOD alone there is no such test, and the interval decides.
-    """
-    differs = row.holm_p <= alpha
-    if np.isfinite(row.equivalent):
-        equal = row.equivalent == 1 and row.tost_holm_p <= alpha
-    else:
-        equal = row.jod_equivalent == 1
-    return (
-        "both"
-        if differs and equal
-        else "different"
-        if differs
-        else "equivalent"
-        if equal
-        else "undecided"
-    )
 
 
 def draw_results(

@@ -204,10 +204,12 @@ def command(
 
 def _source(declared: dict, choices: dict) -> str:
     """Where margins and rules come from, in words."""
-    from analysis.declared import UNDECLARED
+    from analysis.declared import UNDECLARED, fingerprint
 
     given = [name.replace("_", " ") for name, value in choices.items() if value is not None]
-    source = "declared in the study file" if declared else UNDECLARED
+    source = UNDECLARED
+    if declared:
+        source = f"declared in the study file, sha256 of its [analysis] {fingerprint(declared)}"
     return f"{source}; {', '.join(given)} as given on the command line" if given else source
 
 

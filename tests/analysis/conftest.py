@@ -203,7 +203,7 @@ def table():
 @pytest.fixture
 def lines(write, answer):
     """lines("a<<b a=b b>c ...", ...) -> Responses at close-up: one text a participant, < and >
-    point to the technique that lost ...
+    point to the technique that lost ...; every second person sees the pairs the other way round.
 
     a>b: a slightly preferred, a>>b: strongly; a<b, a<<b: the other way; a=b: no difference.
     """
@@ -217,7 +217,10 @@ def lines(write, answer):
         for person, text in enumerate(people):
             for word in text.split():
                 left, mark, right = re.fullmatch(r"(\w+)([<>=]+)(\w+)", word).groups()
-                rows.append(answer(f"P{person:03d}", framing, left, right, values[mark]))
+                value = values[mark]
+                if person % 2:
+                    left, right, value = right, left, -value
+                rows.append(answer(f"P{person:03d}", framing, left, right, value))
         names = sorted({name for text in people for name in re.findall(r"\w+", text)})
         return read_responses(write(rows), order=names)
 

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis import InputError, read_responses
+from analysis import InputError, declared, inference, read_responses
 from analysis.agreement import (
     PARTICIPANTS,
     agreement,
@@ -20,9 +20,12 @@ from analysis.agreement import (
     krippendorff_alpha,
     participants,
     sensitivity,
+    side_balance,
     triads,
     zeta,
 )
+from analysis.compute import everything
+from analysis.conclusions import conclude
 from analysis.options import Exclusions, Options
 from analysis.panel import MISSING, panels
 
@@ -392,7 +395,63 @@ def test_declared_exclusions_name_their_rule(study, table):
     slow = participants(
         faulty(study, table), replace(FAST, exclusions=replace(none, median_rt_ms=1e7))
     )
-    assert (slow.excluded == "median_rt_ms").all()
+    enough = slow.answers >= 5
+    assert (slow.excluded == np.where(enough, "median_rt_ms", "")).all() and not enough.all()
+
+
+def test_a_rule_needs_enough_answers_to_fire(lines):
+    """One pair, one answer each: the default rule of the same answer excluded everybody."""
+    responses = lines("a>b", "a<b", "a=b", "a>b", "a>>b", "a<<b")
+    found = participants(responses, Options())
+    assert (found.same_answer_share == 1).all() and (found.excluded == "").all()
+    assert any("same_answer_share can fire for nobody" in one for one in found.attrs["notes"])
+    ten = lines(*["a=b a=c a=d a=e b=c b=d b=e c=d c=e d=e"] * 6)
+    assert (participants(ten, Options()).excluded == "same_answer_share").all()
+
+
+def test_declared_rules_are_told_from_defaults(lines):
+    chosen = declared.options({"exclusions": {"zeta": 0.2, "one_side_share": False}})
+    (note, *_) = participants(lines("a>b", "a<b"), chosen).attrs["notes"]
+    assert "zeta under 0.2 (declared by the study)" in note and "one side" not in note
+    assert "median answer under 500 ms" in note.split("declared by the study")[1]
+    assert "(defaults of subdermal, not declared)" in note
+
+
+def test_sensitivity_takes_the_reports_verdicts(study, table):
+    """Each conclusion with everyone is the verdict that the table of pairs comes to."""
+    options = replace(FAST, margin=0.9)
+    responses = faulty(study, table)
+    found = sensitivity(responses, options).set_index(["framing", "conclusion", "a", "b"])
+    rows = inference.pairs(responses, options)
+    verdicts = [inference.verdict(row, 0.05) for row in rows.itertuples()]
+    unadjusted = rows.equivalent == 1
+    assert sum(one in ("equivalent", "both") for one in verdicts) < unadjusted.sum()
+    for row, one in zip(rows.itertuples(), verdicts, strict=True):
+        equal = found.everyone[row.framing, "equivalent", row.a, row.b]
+        assert equal == str(int(one in ("equivalent", "both")))
+
+
+def test_sides_that_follow_the_technique_are_named(write, answer):
+    rng = np.random.default_rng(0)
+    fixed, shuffled = [], []
+    for person in range(12):
+        for a, b in ("ab", "ac", "bc"):
+            value = int(rng.integers(-2, 3))
+            turn = rng.random() < 0.5
+            fixed.append(answer(f"P{person}", "close-up", a, b, value))
+            shuffled.append(answer(f"P{person}", "close-up", *((b, a) if turn else (a, b)), value))
+    found = side_balance(read_responses(write(fixed)), FAST).set_index("technique")
+    assert found.left.tolist() == [24, 12, 0] and found.holm_p["a"] < 1e-5
+    assert "a was always on the left; c was always on the right" in found.attrs["notes"][0]
+    fine = side_balance(read_responses(write(shuffled)), FAST)
+    assert (fine.holm_p > 0.05).all() and not fine.attrs["notes"]
+    assert (fine.left + fine.right).tolist() == [24, 24, 24]
+    responses, options = read_responses(write(fixed)), Options(resamples=100)
+    results = everything(responses, options)
+    words = conclude(results.tables, results.notes, responses.codebook, options, 12, False)
+    assert not any("shuffled against that" in one for one in words.can)
+    refused = [one for one in words.cannot if "no worths by the ordinal model" in one]
+    assert "side is confounded with technique" in refused[0]
 
 
 def test_sensitivity_compares_with_and_without(study, table):
@@ -417,7 +476,7 @@ def test_sensitivity_compares_with_and_without(study, table):
     assert (
         clean.everyone.to_numpy() == found.without_excluded.to_numpy()
     ).all() and not clean.changed.any()
-    everyone = sensitivity(responses, replace(FAST, exclusions=Exclusions(median_rt_ms=1e9)))
+    everyone = sensitivity(responses, replace(FAST, exclusions=Exclusions(0.99, median_rt_ms=1e9)))
     assert everyone.empty and "nobody is left" in everyone.attrs["notes"][1]
     margin = sensitivity(responses, replace(FAST, margin=0.5))
     assert set(margin.conclusion) == {"preferred", "equivalent", "first"}

@@ -182,3 +182,10 @@ def test_no_file_and_latin_1_are_refused(tmp_path):
     (tmp_path / "latin.toml").write_bytes(b'items = ["\xe9"]')
     with pytest.raises(InputError, match="UTF-8"):
         read_matrices(tmp_path / "latin.toml")
+
+
+@pytest.mark.parametrize("matrix", [[[1, 2], [3, 1]], [[2, 1], [1, 1]], np.full((3, 3), 0.5)])
+def test_a_matrix_that_is_not_reciprocal_has_no_priorities(matrix):
+    """Of such a matrix lambda_max may lie below n: CR -0.149 and 'coherent'."""
+    with pytest.raises(InputError, match="the matrix is not reciprocal: .* expected 1 within 0.02"):
+        priorities(matrix)

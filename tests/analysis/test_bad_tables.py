@@ -34,12 +34,15 @@ def report(undrawn, write, answer):
 
     def report(people, names, give, pairs=None, framings=("close-up",)):
         rng = np.random.default_rng(0)
-        rows = [
-            answer(f"P{person}", framing, a, b, give(rng, a, b), familiarity=1 + person % 5)
-            for person in range(people)
-            for framing in framings
-            for a, b in (pairs or combinations(names, 2))
-        ]
+        rows = []
+        for person in range(people):
+            for framing in framings:
+                for a, b in pairs or combinations(names, 2):
+                    value = give(rng, a, b)
+                    left, right = (b, a) if person % 2 else (a, b)
+                    value = -value if person % 2 else value
+                    rated = 1 + person % 5
+                    rows.append(answer(f"P{person}", framing, left, right, value, rated))
         return report_responses(
             read_responses(write(rows), order=names),
             options=Options(margin=0.25, margin_jod=0.5, resamples=100),
@@ -107,7 +110,7 @@ def test_eleven_techniques(report):
 
 
 def test_everyone_excluded_leaves_nothing_to_conclude_again(report):
-    assert "those who are left are too few" in in_short(report(6, ["a", "b", "c"], lambda *_: 1))
+    assert "those who are left are too few" in in_short(report(6, list("abcdef"), lambda *_: 0))
 
 
 def test_letters_without_a_glyph_are_said(write, answer):

@@ -8,9 +8,8 @@ import pytest
 
 from analysis.codebook import Codebook
 from analysis.conclusions import conclude
-from analysis.inference import PAIRS
+from analysis.inference import PAIRS, verdict
 from analysis.options import Options
-from analysis.worth_figures import verdict
 
 BOOK = Codebook(
     ("close-up",),
@@ -57,6 +56,9 @@ def tables(*pairs, **changes):
             [], columns=["framing", "technique", "slope", "holm_p", "detectable"]
         ),
         "participants": pd.DataFrame({"excluded": ["", ""]}),
+        "side_balance": pd.DataFrame(
+            [], columns=["framing", "technique", "left", "right", "left_share", "p", "holm_p"]
+        ),
         "sensitivity": pd.DataFrame({"changed": [0, 0]}),
     }
     return found | changes

@@ -41,6 +41,7 @@ TABLES = (
         "sides",
         "ahp_priorities",
         "rejected_rows",
+        "missing_values",
     }
     | {
         *(
@@ -54,7 +55,7 @@ TABLES = (
             "trend",
             "agreement",
         ),
-        *("notes", "participants", "sensitivity", "familiarity_interaction"),
+        *("notes", "participants", "side_balance", "sensitivity", "familiarity_interaction"),
     }
     | {f"ahp_matrix_{name}" for name in ("close-up", "head-shot", "half-length")}
 )

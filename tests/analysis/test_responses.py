@@ -64,22 +64,25 @@ def test_columns_may_stand_in_any_order_with_more_between(write):
 
 
 MALFORMED = {
-    "familiarity": ["", "0", "6", "2.5", "high", "nan"],
-    "answer": ["", "3", "-3", "0.5", "A", "inf", "1e0", "−1"],
-    "order": ["", "0", "-1", "first"],
-    "rt_ms": ["", "-5", "fast", "nan", "inf", "1e999"],
-    "started_at": ["", "yesterday", "2024-13-01T00:00:00Z", "25:00"],
+    "answer": ["", "3", "-3", "0.5", "A", "inf", "1e0"],
     "participant": ["", "  "],
     "framing": [""],
     "left": [""],
     "right": ["", "golubev"],
 }
+UNREADABLE = {
+    "familiarity": ["", "11", "-1", "2.5", "high", "nan"],
+    "order": ["", "0", "-1", "first"],
+    "rt_ms": ["", "-5", "fast", "nan", "inf", "1e999"],
+    "started_at": ["", "yesterday", "2024-13-01T00:00:00Z", "25:00", "31.02.2024"],
+}
 
 
-@pytest.mark.parametrize(
-    ("column", "value"),
-    [(column, value) for column, values in MALFORMED.items() for value in values],
-)
+def each(table):
+    return [(column, value) for column, values in table.items() for value in values]
+
+
+@pytest.mark.parametrize(("column", "value"), each(MALFORMED))
 def test_a_malformed_value_is_reported_with_its_line_and_its_column(write, column, value):
     cells = GOOD.split(",")
     cells[HEADER.split(",").index(column)] = value
@@ -89,6 +92,52 @@ def test_a_malformed_value_is_reported_with_its_line_and_its_column(write, colum
     assert (finding.line, finding.kind, finding.row) == (3, "malformed", bad)
     assert column in finding.reason and "expected" in finding.reason
     assert len(responses.frame) == 1 and responses.rows == 2
+
+
+@pytest.mark.parametrize(("column", "value"), each(UNREADABLE))
+def test_an_answer_counts_whatever_stands_beside_it(write, column, value):
+    cells = GOOD.replace("P1", "P2").split(",")
+    cells[HEADER.split(",").index(column)] = value
+    responses = read_responses(write([GOOD, ",".join(cells)]))
+    assert len(responses.frame) == 2 and not responses.findings
+    (missing,) = responses.missing
+    assert (missing.line, missing.column, missing.value) == (3, column, value)
+    assert responses.frame[column].isna().tolist() == [False, True]
+    (note,) = [one for one in responses.notes if "is missing in 1 answer of 2" in one]
+    assert note.startswith(column) and "counted all the same" in note
+
+
+def test_ratings_from_0_are_ratings(write):
+    rows = [GOOD.replace("P1,3", f"P{level},{level}") for level in range(5)]
+    responses = read_responses(write(rows))
+    assert sorted(responses.ratings) == [0, 1, 2, 3, 4] and not responses.missing
+    assert responses.codebook.ratings == (0, 1, 2, 3, 4, 5)
+
+
+def test_a_study_declares_the_levels_of_its_rating(tmp_path, write):
+    rating = {"labels": ["never", "now and then", "daily"], "levels": [0, 1, 2]}
+    names = {"framings": [{"name": "close-up"}], "techniques": [{"name": "golubev"}]}
+    names["techniques"].append({"name": "none"})
+    codebook = read_manifest(manifest(tmp_path, **names, familiarity=rating))
+    rows = [GOOD.replace("P1,3", f"P{level},{level}") for level in range(4)]
+    responses = read_responses(write(rows), codebook)
+    assert responses.ratings.tolist()[:3] == [0, 1, 2] and np.isnan(responses.ratings["P3"])
+    (missing,) = responses.missing
+    assert missing.expected == "a level of the study's self-rating, 0 to 2"
+
+
+def test_columns_beside_the_answer_may_be_absent(write):
+    header = "participant,framing,left,right,answer"
+    responses = read_responses(write(["P1,close-up,a,b,2", "P2,close-up,b,a,1"], header=header))
+    assert len(responses.frame) == 2 and not responses.missing
+    assert responses.frame.rt_ms.isna().all()
+    assert "has no column rt_ms" in " ".join(responses.notes)
+
+
+def test_a_question_without_its_place_in_the_order_is_no_repeat(write):
+    rows = [GOOD, GOOD.replace(",1,1500", ",,1500"), GOOD.replace(",1,1500", ",7,1500")]
+    responses = read_responses(write(rows))
+    assert len(responses.repeats) == 1 and len(responses.findings) == 2
 
 
 @pytest.mark.parametrize(
@@ -104,13 +153,13 @@ def test_a_row_over_several_lines_names_them_and_later_rows_keep_their_numbers(w
     header = HEADER + ",comment"
     rows = [
         GOOD + ',"first\nsecond"',
-        GOOD.replace(",3,", ",9,") + ',"one\ntwo\nthree"',
+        GOOD.replace(",-2,", ",9,") + ',"one\ntwo\nthree"',
         GOOD.replace("P1", "P2") + ",",
     ]
     responses = read_responses(write(rows, header=header))
     (finding,) = responses.findings
     assert (finding.line, finding.last_line) == (4, 6) and str(finding).startswith(
-        "lines 4 to 6: familiarity is '9'"
+        "lines 4 to 6: answer is '9'"
     )
     assert finding.row == rows[1]
     assert list(responses.frame.line) == [2, 7]
@@ -118,10 +167,10 @@ def test_a_row_over_several_lines_names_them_and_later_rows_keep_their_numbers(w
 
 def test_all_that_is_wrong_with_a_row_is_in_its_finding(write):
     responses = read_responses(
-        write([GOOD, "P1,9,close-up,golubev,none,7,1,1500,2024-05-01T09:00:00Z"])
+        write([GOOD, "P1,9,close-up,golubev,,7,1,1500,2024-05-01T09:00:00Z"])
     )
     assert (
-        "familiarity is '9'" in responses.findings[0].reason
+        "right is ''" in responses.findings[0].reason
         and "answer is '7'" in responses.findings[0].reason
     )
 
@@ -166,24 +215,19 @@ def test_every_row_is_either_counted_or_reported(write, random_study):
         (HEADER.encode() + b"\n\n\n", "no rows"),
         (
             b"participant,answer\nP1,2\n",
-            "has no column familiarity, framing, left, right, order, rt_ms, started_at",
+            "has no column framing, left, right",
         ),
-        (HEADER.replace(",", ";").encode() + b"\n", "separated by ';'"),
-        (HEADER.replace(",", "\t").encode() + b"\n", "separated by '\\t'"),
+        (b"participant;answer;left\nP1;2;a\n", "has no column framing, right"),
         (HEADER.encode() + b",answer\n", "column answer twice"),
         (
-            HEADER.encode() + b"\nP1,9,close-up,a,b,0,1,1,2024\n",
-            "none of its 1 rows can be used; line 2: familiarity is '9'",
+            HEADER.encode() + b"\nP1,3,close-up,a,b,9,1,1,2024\n",
+            "none of its 1 rows can be used; line 2: answer is '9'",
         ),
         (
             HEADER.encode() + b'\nP1,"3,close-up,a,b,0,1,1,2024\nP2\n',
             "line 2: a quotation mark is opened and never closed",
         ),
-        (
-            HEADER.encode() + b"\nJos\xe9,3,close-up,a,b,0,1,1,2024\n",
-            "line 2: byte 0xe9 is not UTF-8",
-        ),
-        (HEADER.encode("utf-16"), "not UTF-8"),
+        (b"\xff\xfe" + HEADER.encode("utf-16-le") + b"\n", "begins as UTF-16"),
     ],
 )
 def test_a_fault_of_the_whole_file_is_refused_in_one_line(tmp_path, content, expected):
@@ -211,7 +255,7 @@ def test_simulated_and_real_answers_never_mix(write):
 
 
 def test_a_rejected_row_still_shows_that_kinds_are_mixed(write):
-    rows = [GOOD + ",0", GOOD.replace("P1,3", "P2,9") + ",1"]
+    rows = [GOOD + ",0", GOOD.replace("P1", "P2").replace("-2", "9") + ",1"]
     with pytest.raises(InputError, match="mixes"):
         read_responses(write(rows, header=HEADER + ",simulated"))
 
@@ -300,9 +344,17 @@ def test_a_broken_manifest_is_refused_in_one_line(tmp_path, content, expected):
     one_line(error)
 
 
-def test_familiarity_labels_must_be_five(tmp_path):
-    with pytest.raises(InputError, match="expected five texts"):
-        read_manifest(manifest(tmp_path, familiarity={"labels": ["one"]}))
+@pytest.mark.parametrize(
+    ("rating", "expected"),
+    [
+        ({"labels": ["one"]}, "expected texts, two or more"),
+        ({"labels": ["a", "b"], "levels": [1, 1]}, "levels is .1, 1., expected whole numbers"),
+        ({"labels": ["a", "b"], "levels": [1, 2, 3]}, "one for each label"),
+    ],
+)
+def test_a_rating_has_two_levels_or_more_that_ascend(tmp_path, rating, expected):
+    with pytest.raises(InputError, match=expected):
+        read_manifest(manifest(tmp_path, familiarity=rating))
 
 
 def test_what_a_reader_should_know_of_counted_rows_is_noted(write, answer):
@@ -326,5 +378,5 @@ def test_records_give_what_the_file_gives(write, random_study):
     )
     columns = ["participant", "framing", "a", "b", "preference", "rt_ms", "started_at"]
     assert from_file.frame[columns].equals(from_records.frame[columns])
-    with pytest.raises(InputError, match="lack rt_ms"):
-        responses_from_records([{name: 1 for name in HEADER.split(",") if name != "rt_ms"}])
+    with pytest.raises(InputError, match="lack left"):
+        responses_from_records([{name: 1 for name in HEADER.split(",") if name != "left"}])
