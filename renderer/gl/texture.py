@@ -15,7 +15,7 @@ _FORMATS = {  # internal format -> (format, channels)
     GL.GL_RG16F: (GL.GL_RG, 2),
     GL.GL_R32F: (GL.GL_RED, 1),
     GL.GL_RGBA8: (GL.GL_RGBA, 4),
-    GL.GL_DEPTH_COMPONENT32F: (GL.GL_DEPTH_COMPONENT, 1),
+    GL.GL_DEPTH_COMPONENT16: (GL.GL_DEPTH_COMPONENT, 1),
 }
 BLENDS = ("over", "add")
 
@@ -208,14 +208,15 @@ class Target:
 class DepthArray(Target):
     """Layers of depth alone, to be drawn one by one and read as a texture array.
 
-    Depth is what a fragment shader writes, or the clip space's own z; 1 where nothing is.
+    Depth is what a fragment shader writes, or the clip space's own z, in steps of 1 / 65535; 1
+    where nothing is.
     """
 
     def __init__(self, size: int, layers: int):
         self.width = self.height = size
         self.textures = []
         self._depth_handle = None
-        self.array = TextureArray(size, size, layers, GL.GL_DEPTH_COMPONENT32F)
+        self.array = TextureArray(size, size, layers, GL.GL_DEPTH_COMPONENT16)
         self._framebuffer()
         self._attach(0)
         GL.glDrawBuffer(GL.GL_NONE)

@@ -16,6 +16,7 @@ from renderer.scene.lights import DistantLight, Light
 EXTINCTION = 1.5  # of the whole layer of hair along its normal
 SHADOW_WIDTH_MM = 0.16  # of a strand in a lamp's map: finer ones would fall between its texels
 MINIMUM_PX = 1.3
+CHUNK = 8192  # strands that are put on the graphics card at a time
 
 
 class Hair:
@@ -52,34 +53,8 @@ class Hair:
         pixels_per_mm: float,
     ) -> None:
         """Blend all strands into the bound target; shared: camera_position, view, projection."""
-        strands = self.strands
         distance = np.linalg.norm(self.points.mean(axis=1) - shared["camera_position"], axis=1)
         order = np.argsort(-distance, kind="stable")  # far strands first: blended back to front
-        points = self.points[order]
-        n, p = points.shape[:2]
-        tangent = np.gradient(points, axis=1)
-        tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-6)
-
-        def twice(array: np.ndarray) -> np.ndarray:
-            return np.repeat(array.reshape(n * p, -1).astype(np.float32), 2, axis=0)
-
-        def per_strand(array: np.ndarray) -> np.ndarray:
-            return twice(np.repeat(array[order][:, None, :], p, axis=1))
-
-        strand = np.empty((2 * n * p, 4), np.float32)
-        strand[:, 0] = np.tile([-1.0, 1.0], n * p)
-        strand[:, 1:2] = twice(np.repeat(self.size * strands.width_mm[order][:, None], p, axis=1))
-        strand[:, 2:3] = twice(strands.cover[order])
-        strand[:, 3:4] = twice(np.tile(np.linspace(0, 1, p), (n, 1)))
-        attributes = {
-            0: twice(points),
-            1: twice(tangent),
-            2: strand,
-            3: per_strand(strands.colour),
-            4: per_strand(self.environment),
-            5: per_strand(self.normals),
-        }
-        mesh = gl.Mesh(attributes, ribbon_faces(n, p))
         defines = {**lamps.defines(), **surroundings.defines()}
         program = programs("passes/hair.frag", defines, vertex="passes/hair.vert")
         values = {
@@ -91,8 +66,38 @@ class Hair:
             "extinction": EXTINCTION,
         }
         program.use(**program.accepts(values))
-        mesh.draw()
-        mesh.delete()
+        for start in range(0, len(order), CHUNK):
+            mesh = self._ribbons(order[start : start + CHUNK])
+            mesh.draw()
+            mesh.delete()
+
+    def _ribbons(self, chosen: np.ndarray) -> gl.Mesh:
+        """These strands (S,), in their order, as what hair.vert takes."""
+        strands, points = self.strands, self.points[chosen]
+        n, p = points.shape[:2]
+        tangent = np.gradient(points, axis=1)
+        tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-6)
+
+        def twice(array: np.ndarray) -> np.ndarray:
+            return np.repeat(array.reshape(n * p, -1).astype(np.float32), 2, axis=0)
+
+        def per_strand(array: np.ndarray) -> np.ndarray:
+            return twice(np.repeat(array[chosen][:, None, :], p, axis=1))
+
+        strand = np.empty((2 * n * p, 4), np.float32)
+        strand[:, 0] = np.tile([-1.0, 1.0], n * p)
+        strand[:, 1:2] = twice(np.repeat(self.size * strands.width_mm[chosen][:, None], p, axis=1))
+        strand[:, 2:3] = twice(strands.cover[chosen])
+        strand[:, 3:4] = twice(np.tile(np.linspace(0, 1, p), (n, 1)))
+        attributes = {
+            0: twice(points),
+            1: twice(tangent),
+            2: strand,
+            3: per_strand(strands.colour),
+            4: per_strand(self.environment),
+            5: per_strand(self.normals),
+        }
+        return gl.Mesh(attributes, ribbon_faces(n, p))
 
 
 def ribbon_faces(strands: int, points: int) -> np.ndarray:

@@ -40,7 +40,7 @@ class Inputs:
 class Scattered:
     """What a technique returns.
 
-    target.textures[0]: RGBA32F scattered irradiance; [1]: RGBA16F, x = samples taken, y = contrast
+    target.textures[0]: RGBA32F scattered irradiance; [1]: RG16F, x = samples taken, y = contrast
     (where it is measured).
     """
 

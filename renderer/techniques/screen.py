@@ -16,7 +16,7 @@ from renderer.gl import GL
 from renderer.techniques.base import Inputs, Scattered, Technique
 
 #: Of every technique's result: scattered irradiance, then samples and contrast.
-FORMATS = (GL.GL_RGBA32F, GL.GL_RGBA16F)
+FORMATS = (GL.GL_RGBA32F, GL.GL_RG16F)
 
 
 def output_formats() -> list[int]:

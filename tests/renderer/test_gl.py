@@ -53,7 +53,9 @@ def test_layers_of_depth_are_drawn_one_by_one(drawing):
         drawing.program("passes/depth.frag", vertex="passes/place.vert").use(clip=np.eye(4))
         mesh.draw()
     got = depth.array.read()[..., 0]
-    np.testing.assert_allclose(got, np.broadcast_to([[[0.5]], [[0.625]], [[0.75]]], got.shape))
+    np.testing.assert_allclose(
+        got, np.broadcast_to([[[0.5]], [[0.625]], [[0.75]]], got.shape), atol=2e-5
+    )
     depth.delete()
 
 
