@@ -21,7 +21,7 @@ import typst
 from analysis.figures import DOUBLE_MM, SIMULATED, Picture
 from analysis.shown import Shown
 
-TEMPLATE = Path(__file__).resolve().parents[1] / "templates" / "report" / "report.typ"
+TEMPLATE = Path(__file__).parent / "templates" / "report.typ"
 #: Width of the text on the page, mm.
 TEXT_MM = 174
 

@@ -44,7 +44,7 @@ from analysis.options import Options
 from analysis.responses import Responses
 from analysis.shown import NOTHING
 
-TEMPLATES = Path(__file__).resolve().parents[1] / "templates" / "report"
+TEMPLATES = Path(__file__).parent / "templates"
 RULE = "Medians are taken above the diagonal, in this order of techniques, and inverted below it."
 SIMULATED_SENTENCE = (
     "These answers were made by a program: no person was asked, and nothing "

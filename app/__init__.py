@@ -37,7 +37,7 @@ def create_app(
     app = Flask(
         "app",
         static_folder=str(Path(__file__).parent / "static"),
-        template_folder=str(Path(__file__).parent.parent / "templates"),
+        template_folder=str(Path(__file__).parent / "templates"),
     )
     app.extensions["study"] = study
     app.extensions["database"] = database

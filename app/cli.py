@@ -18,6 +18,7 @@ VERBS = {
     "redraw": "app.commands.redraw",
     "judge": "app.commands.judge",
     "montecarlo": "app.commands.montecarlo",
+    "cache": "app.commands.cache",
 }
 
 

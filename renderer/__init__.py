@@ -13,7 +13,7 @@ if sys.platform == "linux":
     # pyrender imports pyglet for its viewer, which would look for an X server's libraries.
     os.environ.setdefault("PYGLET_HEADLESS", "true")
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"
 _WHERE = {
     "Renderer": "renderer.frame",
     "driver": "renderer.frame",

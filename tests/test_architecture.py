@@ -21,6 +21,7 @@ PROFILE_VERBS = {
     "judge",
     "montecarlo",
     "media",
+    "cache",
 }  # what they hand over to needs no OpenGL
 MODULES = [path for package in MAY_IMPORT for path in sorted((ROOT / package).rglob("*.py"))]
 
@@ -74,13 +75,49 @@ def test_imports(path):
             | ({"renderer", "stimuli.scenes"} if relative.stem == "render" else set())
         )
         allowed |= (
-            {"renderer.errors", "renderer.optics.medium", "renderer.optics"}
+            {"renderer.errors", "renderer.caches", "renderer.optics"}
             if relative.stem in PROFILE_VERBS
             else set()
         )
     assert not forbidden(
         imported(path.read_text(), ".".join(relative.parts[:-1])), package, allowed
     )
+
+
+def at_import(source: str) -> set[str]:
+    """What a module imports when it is imported: not in functions, not for types."""
+    names: set[str] = set()
+    waiting = list(ast.parse(source).body)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Try):
+            waiting += node.body
+    return names
+
+
+def test_no_import_goes_in_a_circle():
+    """Inside packages, too: each module stands on others that do not need it."""
+    import networkx
+
+    files = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in MODULES
+    }
+    graph = networkx.DiGraph()
+    for name, path in files.items():
+        graph.add_node(name)
+        for other in at_import(path.read_text()) & files.keys():
+            if other != name and not name.startswith(f"{other}."):
+                graph.add_edge(name, other)
+    circles = [
+        sorted(part) for part in networkx.strongly_connected_components(graph) if len(part) > 1
+    ]
+    assert not circles
 
 
 def test_application_never_imports_opengl():
@@ -137,3 +174,40 @@ def test_renderer_needs_no_x_server():
     assert "pyrender.viewer" in modules and not any(
         name.startswith("pyglet.libs.x11") for name in modules
     )
+
+
+def room(path: Path) -> str:
+    """The package or sub-package of a file, as the picture calls it: app_commands, renderer."""
+    parts = path.relative_to(ROOT).parts[:-1]
+    return "_".join(parts[:2])
+
+
+def test_the_picture_of_the_rooms_is_that_of_the_imports():
+    """docs/architecture.md draws no arrow that is not there, and leaves out only those that follow
+    from it: into a package's own top (errors, parameters), or by a way that it draws.
+    """
+    import networkx
+
+    text = (ROOT / "docs/architecture.md").read_text().split("flowchart TD")[1].split("```")[0]
+    drawn = networkx.DiGraph()
+    for line in text.strip().splitlines():
+        source, target = (end.strip().split("[")[0] for end in line.split("-->"))
+        drawn.add_edge(source, target)
+    real = networkx.DiGraph()
+    files = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in MODULES
+    }
+    for path in MODULES:
+        package = ".".join(path.relative_to(ROOT).parts[:-1])
+        for name in imported(path.read_text(), package) & files.keys():
+            if room(files[name]) != room(path):
+                real.add_edge(room(path), room(files[name]))
+    assert not set(drawn.edges) - set(real.edges)
+    followed = networkx.transitive_closure(drawn)
+    for source, target in real.edges:
+        own_top = source.startswith(f"{target}_") or target.startswith(f"{source}_")
+        assert own_top or followed.has_edge(source, target) or target == "renderer", (
+            source,
+            target,
+        )

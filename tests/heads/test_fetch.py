@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from renderer import caches
 from stimuli.errors import InputError
 from stimuli.heads import fetch
 
@@ -310,13 +311,13 @@ def test_where_the_cache_is(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("SUBDERMAL_CACHE", raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    assert fetch.cache_folder() == tmp_path / ".cache/subdermal"
+    assert caches.folder() == tmp_path / ".cache/subdermal"
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    assert fetch.cache_folder() == tmp_path / ".cache/subdermal"
+    assert caches.folder() == tmp_path / ".cache/subdermal"
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert fetch.cache_folder() == tmp_path / "xdg/subdermal"
+    assert caches.folder() == tmp_path / "xdg/subdermal"
     monkeypatch.setenv("SUBDERMAL_CACHE", "~/mine")
-    assert fetch.cache_folder() == tmp_path / "mine"
+    assert caches.folder() == tmp_path / "mine"
 
 
 @pytest.mark.network

@@ -1,0 +1,61 @@
+"""`subdermal cache`: where caches are, how large, and how to empty one."""
+
+import shutil
+from pathlib import Path
+
+import click
+
+
+def caches() -> dict[str, tuple[Path, str]]:
+    """name -> (folder, what is in it)."""
+    from renderer.caches import folder
+    from renderer.optics.montecarlo import cache_folder
+
+    return {
+        "heads": (folder(), "base data of generated people, fetched again when needed"),
+        "montecarlo": (
+            cache_folder(),
+            "simulated light in media; simulated again",
+        ),
+    }
+
+
+def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
+    """Bytes of the files below a folder, but for those below the folders `without`."""
+    files = (path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
+    return sum(
+        path.stat().st_size
+        for path in files
+        if not any(
+            other != folder and other.is_relative_to(folder) and path.is_relative_to(other)
+            for other in without
+        )
+    )
+
+
+@click.command()
+@click.option(
+    "--clear",
+    metavar="NAME",
+    type=click.Choice(["heads", "montecarlo"]),
+    help="Remove this cache: heads or montecarlo. Nothing in it is lost for good.",
+)
+def command(clear: str | None) -> None:
+    """List the caches: where each is, and how large.
+
+    A build's images and a study's answers are no caches: they lie where you put them.
+    """
+    found = caches()
+    folders = tuple(folder for folder, _ in found.values())
+    if clear:
+        folder, _ = found[clear]
+        inner = tuple(other for other in folders if other != folder)
+        before = size_of(folder, inner)
+        for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+            if path not in inner:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+        click.echo(f"{clear}: {before / 2**20:.1f} MB removed from {folder}")
+        return
+    for name, (folder, words) in found.items():
+        click.echo(f"{name:<11}{size_of(folder, folders) / 2**20:>9.1f} MB  {folder}")
+        click.echo(f"{'':<11}{words}")
