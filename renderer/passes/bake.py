@@ -26,13 +26,15 @@ CHUNK = 4096
 class Body:
     """A mesh that light is baked on, in the world.
 
-    positions, normals, albedo (N, 3); faces (M, 3).
+    positions, normals, albedo (N, 3); faces (M, 3). smooth: how often a vertex's light is averaged
+    with its neighbours', since the bake's noise is per vertex: finer meshes take more.
     """
 
     positions: np.ndarray
     normals: np.ndarray
     faces: np.ndarray
     albedo: np.ndarray
+    smooth: int = 2
 
 
 @dataclass(frozen=True)
@@ -232,8 +234,8 @@ def bake(
         piece = slice(start[k], start[k + 1])
         parts.append(
             Baked(
-                _smooth(baked.light[piece], body.faces, 2),
-                _smooth(baked.openness[piece], body.faces, 2),
+                _smooth(baked.light[piece], body.faces, body.smooth),
+                _smooth(baked.openness[piece], body.faces, body.smooth),
             )
         )
     return parts

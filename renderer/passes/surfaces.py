@@ -217,7 +217,7 @@ def _body(item: Item) -> Body:
         albedo, value = proxy.albedo, part.material.value
         if isinstance(value, Skin) and proxy.masks is not None:
             albedo = value.mean_albedo(proxy.masks)
-        return Body(positions, normals, proxy.faces, np.asarray(albedo))
+        return Body(positions, normals, proxy.faces, np.asarray(albedo), proxy.smooth)
     positions, normals = _world(item, part.positions), _turned(item, part.normals)
     grey = np.full((len(positions), 3), 0.5)
     return Body(positions, normals, part.faces, grey)

@@ -52,16 +52,18 @@ class Proxy:
     albedo: np.ndarray
     to_full: object
     masks: np.ndarray | None = None
+    smooth: int = 2
 
     @classmethod
-    def itself(cls, positions, normals, faces, albedo) -> Proxy:
+    def itself(cls, positions, normals, faces, albedo, smooth: int = 2) -> Proxy:
         """The surface as its own proxy; albedo (3,) or (N, 3)."""
         from scipy import sparse
 
         count = len(positions)
         albedo = np.broadcast_to(np.asarray(albedo, float), (count, 3))
         to_full = sparse.identity(count, format="csr")
-        return cls(np.asarray(positions, float), np.asarray(normals, float), faces, albedo, to_full)
+        at, towards = np.asarray(positions, float), np.asarray(normals, float)
+        return cls(at, towards, faces, albedo, to_full, smooth=smooth)
 
 
 @dataclass(frozen=True)

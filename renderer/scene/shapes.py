@@ -26,6 +26,7 @@ class Shape:
     uvs: np.ndarray
     faces: np.ndarray
     colours: np.ndarray | None = None
+    generated: bool = True
 
 
 def vertex_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -47,7 +48,7 @@ def grid_faces(rows: int, columns: int) -> np.ndarray:
     return np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
 
 
-def sphere(radius_mm: float, rings: int = 128) -> Shape:
+def sphere(radius_mm: float, rings: int = 96) -> Shape:
     """A sphere; its atlas is latitude and longitude."""
     v, u = np.meshgrid(
         np.linspace(0, 1, rings + 1), np.linspace(0, 1, 2 * rings + 1), indexing="ij"

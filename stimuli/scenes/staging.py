@@ -67,6 +67,10 @@ def _model(thing: objects.Object, scene: Scene, seed: int):
     return _shape(_generated(thing, material), material), {"shape": thing.shape}, [GENERATED], []
 
 
+#: Generated shapes are finer than their light needs: noise is averaged over more neighbours.
+GENERATED_SMOOTH = 16
+
+
 def _generated(thing: objects.Object, material: Material) -> shapes.Shape:
     if isinstance(thing, objects.Sphere):
         return shapes.sphere(thing.radius_mm)
@@ -83,7 +87,8 @@ def _shape(shape: shapes.Shape, material: Material) -> Model:
     """A generated shape as a model; its own colours become an albedo map of one texel a face."""
     count = len(shape.positions)
     albedo = np.array(material.albedo) if shape.colours is None else shape.colours
-    proxy = Proxy.itself(shape.positions, shape.normals, shape.faces, albedo)
+    smooth = GENERATED_SMOOTH if shape.generated else 2
+    proxy = Proxy.itself(shape.positions, shape.normals, shape.faces, albedo, smooth)
     surface = Surface(
         shape.positions.astype(np.float32),
         shape.normals.astype(np.float32),
@@ -134,4 +139,4 @@ def _mesh_arrays(file: str, unit: str, up: str) -> tuple[np.ndarray, ...]:
 
 
 def _mesh(file: str, unit: str, up: str, material: Material) -> Model:
-    return _shape(shapes.Shape(*_mesh_arrays(file, unit, up)), material)
+    return _shape(shapes.Shape(*_mesh_arrays(file, unit, up), generated=False), material)
