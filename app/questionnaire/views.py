@@ -70,8 +70,8 @@ def consent():
 def familiarity():
     with database().read() as db:
         participant = _participant(db, alone=True)
-        if elsewhere := _elsewhere(db, participant):
-            return elsewhere
+        if redirection := _redirect_to_due(db, participant):
+            return redirection
         return render_template("questionnaire/familiarity.html", participant=participant)
 
 
@@ -93,8 +93,8 @@ def rate():
 def question():
     with database().write() as db:
         participant = _participant(db, alone=True)
-        if elsewhere := _elsewhere(db, participant):
-            return elsewhere
+        if redirection := _redirect_to_due(db, participant):
+            return redirection
         trial = flow.current(db, participant)
         flow.show(db, trial)
         return render_template(
@@ -158,8 +158,8 @@ def thanks():
             flow.complete(
                 db, participant
             )  # where the server stopped between the last answer and the count
-        if elsewhere := _elsewhere(db, participant):
-            return elsewhere
+        if redirection := _redirect_to_due(db, participant):
+            return redirection
         return render_template(
             "questionnaire/thanks.html", participant=participant, **_progress(db, participant)
         )
@@ -192,7 +192,9 @@ def withdraw_now():
 @blueprint.get("/withdrawn")
 def withdrawn():
     with database().read() as db:
-        return _elsewhere(db, _participant(db)) or render_template("questionnaire/withdrawn.html")
+        return _redirect_to_due(db, _participant(db)) or render_template(
+            "questionnaire/withdrawn.html"
+        )
 
 
 @blueprint.post("/another")
@@ -217,7 +219,7 @@ def _place(db: Session, participant: Participant | None) -> str:
     return "questionnaire.question" if flow.current(db, participant) else "questionnaire.thanks"
 
 
-def _elsewhere(db: Session, participant: Participant | None):
+def _redirect_to_due(db: Session, participant: Participant | None):
     """A redirect to the page that is due, unless it is the one asked for."""
     place = _place(db, participant)
     return None if place == request.endpoint else redirect(url_for(place), 303)

@@ -49,6 +49,10 @@ class GaussianCurve:
     albedo: tuple[float, ...]
     source: str = ""
 
+    @property
+    def channels(self) -> int:
+        return len(self.weights[0])
+
     def curve(self) -> Curve:
         """The rings of the sum."""
         variance, weights = np.array(self.variance_mm2), np.array(self.weights)

@@ -17,8 +17,7 @@ import time
 import zipfile
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import asdict, astuple, dataclass
-from functools import cached_property
+from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -199,37 +198,120 @@ class Tally:
             at += size
 
 
+#: What a run estimates, each with its standard error.
+ESTIMATES = (
+    "specular",
+    "ballistic",
+    "diffuse_reflectance",
+    "single_reflectance",
+    "multiple_reflectance",
+    "transmittance",
+    "single_transmittance",
+    "multiple_transmittance",
+    "absorbed",
+    "absorbed_by_layer",
+    "R",
+    "R_single",
+    "R_multiple",
+    "R_beyond",
+    "T",
+    "T_single",
+    "T_multiple",
+    "T_beyond",
+    "R_angular",
+    "T_angular",
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """What became of one unit of light.
 
-    All shares are of the incident light; each NAME has a NAME_error, one standard error.
+    All shares are of the incident light; each NAME has a NAME_error, one standard error from the
+    spread between batches. `simulate` says what each is.
     """
 
     setting: Setting
     photons: int
     tally: Tally
+    specular: float = field(init=False)
+    specular_error: float = field(init=False)
+    ballistic: float = field(init=False)
+    ballistic_error: float = field(init=False)
+    diffuse_reflectance: float = field(init=False)
+    diffuse_reflectance_error: float = field(init=False)
+    single_reflectance: float = field(init=False)
+    single_reflectance_error: float = field(init=False)
+    multiple_reflectance: float = field(init=False)
+    multiple_reflectance_error: float = field(init=False)
+    transmittance: float = field(init=False)
+    transmittance_error: float = field(init=False)
+    single_transmittance: float = field(init=False)
+    single_transmittance_error: float = field(init=False)
+    multiple_transmittance: float = field(init=False)
+    multiple_transmittance_error: float = field(init=False)
+    absorbed: float = field(init=False)
+    absorbed_error: float = field(init=False)
+    absorbed_by_layer: np.ndarray = field(init=False)
+    absorbed_by_layer_error: np.ndarray = field(init=False)
+    R: np.ndarray = field(init=False)
+    R_error: np.ndarray = field(init=False)
+    R_single: np.ndarray = field(init=False)
+    R_single_error: np.ndarray = field(init=False)
+    R_multiple: np.ndarray = field(init=False)
+    R_multiple_error: np.ndarray = field(init=False)
+    R_beyond: float = field(init=False)
+    R_beyond_error: float = field(init=False)
+    T: np.ndarray = field(init=False)
+    T_error: np.ndarray = field(init=False)
+    T_single: np.ndarray = field(init=False)
+    T_single_error: np.ndarray = field(init=False)
+    T_multiple: np.ndarray = field(init=False)
+    T_multiple_error: np.ndarray = field(init=False)
+    T_beyond: float = field(init=False)
+    T_beyond_error: float = field(init=False)
+    R_angular: np.ndarray = field(init=False)
+    R_angular_error: np.ndarray = field(init=False)
+    T_angular: np.ndarray = field(init=False)
+    T_angular_error: np.ndarray = field(init=False)
 
-    def __getattr__(self, name: str):
-        if name.endswith("_error") and name[:-6] in Result._MEANS:
-            return self._estimate(name[:-6])[1]
-        if name in Result._MEANS:
-            return self._estimate(name)[0]
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-
-    @cached_property
-    def _estimates(self) -> dict:
-        return {}
-
-    def _estimate(self, name: str) -> tuple:
-        """Mean over photons and its standard error from the spread of batches."""
-        if name not in self._estimates:
-            sums, sizes = Result._MEANS[name](self), batch_sizes(self.photons)
+    def __post_init__(self) -> None:
+        sizes = batch_sizes(self.photons)
+        for name, sums in self._sums().items():
             mean = sums.sum(0) / self.photons
             off = sums - sizes.reshape(-1, *[1] * (sums.ndim - 1)) * mean
             error = np.sqrt((off**2).sum(0) * BATCHES / (BATCHES - 1)) / self.photons
-            self._estimates[name] = (float(mean), float(error)) if mean.ndim == 0 else (mean, error)
-        return self._estimates[name]
+            scalar = mean.ndim == 0
+            object.__setattr__(self, name, float(mean) if scalar else mean)
+            object.__setattr__(self, f"{name}_error", float(error) if scalar else error)
+
+    def _sums(self) -> dict[str, np.ndarray]:
+        """The sum over each batch's photons of every estimate: (BATCHES, ...)."""
+        radial, angular, unscattered = self.tally.radial, self.tally.angular, self.tally.unscattered
+        absorbed, area, angle = self.tally.absorbed, self.area_mm2, self.solid_angle
+        rings, beyond = radial[..., :-1], radial[..., -1]
+        return {
+            "specular": unscattered[:, 0],
+            "ballistic": unscattered[:, 1],
+            "diffuse_reflectance": radial[:, :2].sum((1, 2)),
+            "single_reflectance": radial[:, 0].sum(1),
+            "multiple_reflectance": radial[:, 1].sum(1),
+            "transmittance": radial[:, 2:].sum((1, 2)) + unscattered[:, 1],
+            "single_transmittance": radial[:, 2].sum(1),
+            "multiple_transmittance": radial[:, 3].sum(1),
+            "absorbed": absorbed.sum(1),
+            "absorbed_by_layer": absorbed,
+            "R": rings[:, :2].sum(1) / area,
+            "R_single": rings[:, 0] / area,
+            "R_multiple": rings[:, 1] / area,
+            "R_beyond": beyond[:, :2].sum(1),
+            "T": rings[:, 2:].sum(1) / area,
+            "T_single": rings[:, 2] / area,
+            "T_multiple": rings[:, 3] / area,
+            "T_beyond": beyond[:, 2:].sum(1),
+            "R_angular": angular[:, 0] / angle,
+            "T_angular": angular[:, 1] / angle,
+        }
 
     @property
     def edges_mm(self) -> np.ndarray:
@@ -256,30 +338,6 @@ class Result:
         """Solid angle of each bin of exit angles, sr: (angles,)."""
         return -2 * np.pi * np.diff(np.cos(self.angle_edges))
 
-    # Each name: sums of weight per batch, (BATCHES, ...). Listed in the docstrings of `simulate`.
-    _MEANS = {
-        "specular": lambda s: s.tally.unscattered[:, 0],
-        "ballistic": lambda s: s.tally.unscattered[:, 1],
-        "diffuse_reflectance": lambda s: s.tally.radial[:, :2].sum((1, 2)),
-        "single_reflectance": lambda s: s.tally.radial[:, 0].sum(1),
-        "multiple_reflectance": lambda s: s.tally.radial[:, 1].sum(1),
-        "transmittance": lambda s: s.tally.radial[:, 2:].sum((1, 2)) + s.tally.unscattered[:, 1],
-        "single_transmittance": lambda s: s.tally.radial[:, 2].sum(1),
-        "multiple_transmittance": lambda s: s.tally.radial[:, 3].sum(1),
-        "absorbed": lambda s: s.tally.absorbed.sum(1),
-        "absorbed_by_layer": lambda s: s.tally.absorbed,
-        "R": lambda s: s.tally.radial[:, :2, :-1].sum(1) / s.area_mm2,
-        "R_single": lambda s: s.tally.radial[:, 0, :-1] / s.area_mm2,
-        "R_multiple": lambda s: s.tally.radial[:, 1, :-1] / s.area_mm2,
-        "R_beyond": lambda s: s.tally.radial[:, :2, -1].sum(1),
-        "T": lambda s: s.tally.radial[:, 2:, :-1].sum(1) / s.area_mm2,
-        "T_single": lambda s: s.tally.radial[:, 2, :-1] / s.area_mm2,
-        "T_multiple": lambda s: s.tally.radial[:, 3, :-1] / s.area_mm2,
-        "T_beyond": lambda s: s.tally.radial[:, 2:, -1].sum(1),
-        "R_angular": lambda s: s.tally.angular[:, 0] / s.solid_angle,
-        "T_angular": lambda s: s.tally.angular[:, 1] / s.solid_angle,
-    }
-
     def as_dict(self) -> dict:
         """Everything, ready for JSON."""
         plain = lambda value: value.tolist() if isinstance(value, np.ndarray) else value
@@ -295,8 +353,9 @@ class Result:
             "angle_edges": plain(self.angle_edges),
         }
         del found["angles"]
-        for name in Result._MEANS:
-            found[name], found[f"{name}_error"] = map(plain, self._estimate(name))
+        for name in ESTIMATES:
+            for key in (name, f"{name}_error"):
+                found[key] = plain(getattr(self, key))
         return found
 
 

@@ -73,9 +73,10 @@ class Surfaces:
         mesh = gl.Mesh(_attributes(part, part.masks, light, openness, scatters), part.faces)
         number = 0
         if material.scatters and np.any(scatters):
-            if material.medium not in self.media:
-                self.media.append(material.medium)
-            number = 1 + self.media.index(material.medium)
+            medium = material.layered()
+            if medium not in self.media:
+                self.media.append(medium)
+            number = 1 + self.media.index(medium)
         maps = {name: _map(getattr(part.material, name)) for name in MAPS}
         return Drawn(item, mesh, Baked(light.reshape(-1, 3, 3), openness[:, 0]), number, maps)
 

@@ -24,14 +24,18 @@ class Material(Parameters):
     """A surface of one colour, or with maps, over a medium that scatters or does not.
 
     medium: a preset's name or a table of coefficients (renderer.optics.media), "" for a surface
-    that does not scatter. albedo is linear, the share of diffuse light that comes back. Maps are
-    image files (a scan brings its own): albedo in sRGB, normals in tangent space, roughness grey.
+    that does not scatter. thickness: "solid", or that of a sheet of the medium in mm. coatings:
+    layers above it, outermost first, each a table with `medium` and `thickness_mm`. albedo is
+    linear, the share of diffuse light that comes back. Maps are image files (a scan brings its
+    own): albedo in sRGB, normals in tangent space, roughness grey.
     """
 
     kind: ClassVar[str] = "plain"
     called: ClassVar[str] = "material"
 
     medium: str | dict = "skin"
+    thickness: str | float = "solid"
+    coatings: tuple[dict, ...] = ()
     albedo: tuple[float, float, float] = parameter(
         (0.56, 0.38, 0.30), source="light skin, chosen by eye", **_SHARE
     )
@@ -59,9 +63,35 @@ class Material(Parameters):
                 f"{self.where('medium')} is {self.medium!r:.60}; "
                 "expected a preset's name or a table of coefficients"
             )
+        thickness = self.thickness
+        number = isinstance(thickness, int | float) and not isinstance(thickness, bool)
+        if thickness != "solid" and not (number and 0 < thickness < 1e5):
+            raise InputError(
+                f"{self.where('thickness')} is {thickness!r:.60}; expected 'solid', or millimetres "
+                "above 0"
+            )
+        for k, layer in enumerate(self.coatings):
+            if not isinstance(layer, Mapping) or set(layer) != {"medium", "thickness_mm"}:
+                raise InputError(
+                    f"{self.where('coatings')}[{k}] is {layer!r:.60}; expected a table with medium "
+                    "and thickness_mm"
+                )
+        if (self.coatings or thickness != "solid") and not self.medium:
+            raise InputError(
+                f"{self.where('medium')} is empty; expected one for the sheet or the coatings"
+            )
 
     def plain(self) -> dict[str, Any]:
         return {"kind": self.kind, **super().plain()}
+
+    def layered(self) -> str | dict:
+        """The medium with its thickness and its coatings, as renderer.optics.media reads it."""
+        if self.thickness == "solid" and not self.coatings:
+            return self.medium
+        below = {"medium": self.medium} if isinstance(self.medium, str) else dict(self.medium)
+        if self.thickness != "solid":
+            below["thickness_mm"] = self.thickness
+        return {"layers": [*(dict(layer) for layer in self.coatings), below]}
 
     @property
     def scatters(self) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from renderer.errors import InputError
+from renderer.optics import media
 from renderer.parameters import plain, refuse_unknown
 from renderer.scene.camera import Camera
 from renderer.scene.lights import Environment, Light, read_light
@@ -52,6 +53,14 @@ class Scene:
                 raise InputError(
                     f"{where}.objects.{name}.material is {thing.material!r}; expected {known}"
                 )
+        for name, material in materials.items():
+            if material.scatters:
+                found = media.read(material.layered(), f"{where}.materials.{name}.medium")
+                if found.channels != 3:
+                    raise InputError(
+                        f"{where}.materials.{name}.medium has {found.channels} channels; "
+                        "expected 3, red, green and blue"
+                    )
         subject = table.get("subject", next(iter(objects)))
         if subject not in objects:
             raise InputError(
