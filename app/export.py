@@ -72,7 +72,7 @@ COLUMNS = (
         "text",
         "a framing of the study",
         "Distance at which both images of the question were taken",
-        lambda r: r.study.asked.cell(r.trial.cell).framing,
+        lambda r: r.study.definition.cell(r.trial.cell).framing,
     ),
     Column(
         "left",
@@ -239,9 +239,9 @@ def columns(study: Study) -> tuple[Column, ...]:
             "text",
             "a level of the study",
             f"{factor.label}: the level that both images of the question have",
-            lambda r, name=factor.name: r.study.asked.cell(r.trial.cell).levels[name],
+            lambda r, name=factor.name: r.study.definition.cell(r.trial.cell).levels[name],
         )
-        for factor in study.asked.factors[1:]
+        for factor in study.definition.factors[1:]
     ]
     return (*COLUMNS[:place], *further, *COLUMNS[place:])
 
@@ -291,7 +291,7 @@ def codebook_csv(study: Study) -> Iterator[str]:
 
 def codebook_md(study: Study, *, simulated: bool) -> str:
     """codebook.md: the same for reading, with what the names and numbers stand for."""
-    asked = study.asked
+    asked = study.definition
     lines = [
         f"# Codebook of {asked.title} ({asked.name}, version {asked.version})",
         "",

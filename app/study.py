@@ -35,34 +35,34 @@ class Study:
         return self.manifest.directory.resolve()
 
     @property
-    def asked(self) -> Definition:
+    def definition(self) -> Definition:
         """The definition: title, question, scale, familiarity, consent, labels."""
         return self.manifest.study
 
     @property
     def name(self) -> str:
-        return self.asked.name
+        return self.definition.name
 
     @property
     def version(self) -> int:
-        return self.asked.version
+        return self.definition.version
 
     @property
     def seed(self) -> int:
-        return self.asked.seed
+        return self.definition.seed
 
     @cached_property
     def framings(self) -> tuple[str, ...]:
-        return tuple(level.name for level in self.asked.framings)
+        return tuple(level.name for level in self.definition.framings)
 
     @cached_property
     def cells(self) -> tuple[str, ...]:
         """The names of the cells: the framings' own where the study varies nothing else."""
-        return tuple(cell.name for cell in self.asked.cells)
+        return tuple(cell.name for cell in self.definition.cells)
 
     @cached_property
     def techniques(self) -> tuple[str, ...]:
-        return tuple(condition.name for condition in self.asked.techniques)
+        return tuple(condition.name for condition in self.definition.techniques)
 
     @cached_property
     def design(self) -> str:
@@ -82,14 +82,14 @@ class Study:
     @property
     def consent(self) -> tuple[str, ...]:
         """The paragraphs of the consent text, with what is asked and stored filled in."""
-        questions = self.asked.questions
+        questions = self.definition.questions
         low, high = (max(1, round(questions * seconds / 60)) for seconds in SECONDS_A_QUESTION)
         filled = {
             "questions": str(questions),
             "minutes": str(low) if low == high else f"{low} to {high}",
             "recorded": RECORDED,
         }
-        text = self.asked.consent
+        text = self.definition.consent
         for name, value in filled.items():
             text = text.replace(f"{{{name}}}", value)
         return tuple(text.split("\n\n"))

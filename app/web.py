@@ -56,7 +56,7 @@ def wants_json() -> bool:
 def init(app: Flask) -> None:
     app.register_blueprint(blueprint)
     app.register_error_handler(HTTPException, _error_page)
-    app.context_processor(lambda: {"study": study().asked, "simulated": simulated()})
+    app.context_processor(lambda: {"study": study().definition, "simulated": simulated()})
 
 
 @blueprint.get("/images/<sha256>")

@@ -144,11 +144,11 @@ def sides(db: Session, study: Study) -> dict[str, Any]:
     return {
         "shown": [
             {"label": condition.label, "name": condition.name, **shown[condition.name]}
-            for condition in study.asked.techniques
+            for condition in study.definition.techniques
         ],
         "preferred": {side: preferred.get(side, 0) for side in ("left", "neither", "right")},
         "given": [
             {"label": level.label, "count": given.get(level.value, 0)}
-            for level in study.asked.scale
+            for level in study.definition.scale
         ],
     }

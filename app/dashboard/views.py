@@ -66,9 +66,11 @@ def index():
     return render_template(
         "dashboard/index.html",
         images=study().manifest.images,
-        cell_labels={cell.name: study().asked.cell_label(cell) for cell in study().asked.cells},
+        cell_labels={
+            cell.name: study().definition.cell_label(cell) for cell in study().definition.cells
+        },
         technique_labels={
-            condition.name: condition.label for condition in study().asked.techniques
+            condition.name: condition.label for condition in study().definition.techniques
         },
         has_report=study().report(simulated()).is_file(),
         **_numbers(),

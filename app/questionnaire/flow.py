@@ -49,14 +49,14 @@ class Answer:
     shown_height: float | None = None
 
 
-def find(session: Session, visit: str | None, *, alone: bool = False) -> Participant | None:
+def find(session: Session, visit: str | None, *, lock: bool = False) -> Participant | None:
     """The participant of a visit; None before consent.
 
-    alone: wait until no other transaction holds this participant, so that two clicks come one after
+    lock: wait until no other transaction holds this participant, so that two clicks come one after
     the other (SQLite has one writer anyway).
     """
     query = select(Participant).where(Participant.visit == visit)
-    return session.scalar(query.with_for_update() if alone else query) if visit else None
+    return session.scalar(query.with_for_update() if lock else query) if visit else None
 
 
 def enrol(session: Session, study: Study, visit: str) -> Participant:

@@ -69,7 +69,7 @@ def consent():
 @blueprint.get("/familiarity")
 def familiarity():
     with database().read() as db:
-        participant = _participant(db, alone=True)
+        participant = _participant(db, lock=True)
         if redirection := _redirect_to_due(db, participant):
             return redirection
         return render_template("questionnaire/familiarity.html", participant=participant)
@@ -77,12 +77,12 @@ def familiarity():
 
 @blueprint.post("/familiarity")
 def rate():
-    value = _integer("familiarity", 1, len(study().asked.familiarity.labels))
+    value = _integer("familiarity", 1, len(study().definition.familiarity.labels))
     if value is None:
         flash("Please choose one of the levels.")
         return redirect(url_for(".familiarity"), 303)
     with database().write() as db:
-        participant = _participant(db, alone=True)
+        participant = _participant(db, lock=True)
         if participant:
             flow.rate(db, participant, value)
         place = _place(db, participant)
@@ -92,7 +92,7 @@ def rate():
 @blueprint.get("/question")
 def question():
     with database().write() as db:
-        participant = _participant(db, alone=True)
+        participant = _participant(db, lock=True)
         if redirection := _redirect_to_due(db, participant):
             return redirection
         trial = flow.current(db, participant)
@@ -101,7 +101,7 @@ def question():
             "questionnaire/question.html",
             participant=participant,
             trial=trial,
-            framing=study().framings.index(study().asked.cell(trial.cell).framing),
+            framing=study().framings.index(study().definition.cell(trial.cell).framing),
             images=_images(trial),
             upcoming=_images(flow.following(db, trial)),
             **_progress(db, participant),
@@ -130,14 +130,14 @@ def answer():
         shown_height=_number("shown_height", _LARGEST_SIZE),
     )
     with database().write() as db:
-        participant = _participant(db, alone=True)
+        participant = _participant(db, lock=True)
         if participant is None:
             abort(400, "This browser has not begun the questionnaire.")
         outcome = flow.answer(db, study(), participant, trial, given)
     with (
         database().write() as db
     ):  # the answer is on the disk: now the committed answers can be counted
-        participant = _participant(db, alone=True)
+        participant = _participant(db, lock=True)
         flow.complete(db, participant)
         place = _place(db, participant)
     kept = outcome in (Outcome.RECORDED, Outcome.REPEATED)
@@ -153,7 +153,7 @@ def answer():
 @blueprint.get("/thanks")
 def thanks():
     with database().write() as db:
-        participant = _participant(db, alone=True)
+        participant = _participant(db, lock=True)
         if participant:
             flow.complete(
                 db, participant
@@ -183,7 +183,7 @@ def withdraw_now():
                 flash("No participant was given this code. Please check it.")
                 return redirect(url_for(".withdraw"), 303)
             session["visit"] = participant.visit
-        elif (participant := _participant(db, alone=True)) is None:
+        elif (participant := _participant(db, lock=True)) is None:
             return redirect(url_for(".withdraw"), 303)
         flow.withdraw(db, participant)
     return redirect(url_for(".withdrawn"), 303)
@@ -204,8 +204,8 @@ def another():
     return redirect(url_for(".welcome"), 303)
 
 
-def _participant(db: Session, *, alone: bool = False) -> Participant | None:
-    return flow.find(db, session.get("visit"), alone=alone)
+def _participant(db: Session, *, lock: bool = False) -> Participant | None:
+    return flow.find(db, session.get("visit"), lock=lock)
 
 
 def _place(db: Session, participant: Participant | None) -> str:

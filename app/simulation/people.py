@@ -67,7 +67,7 @@ class Crowd:
         self._seed = seed
         place = {framing: k for k, framing in enumerate(study.framings)}
         self._worths, self._reluctance = {}, {}
-        for cell in study.asked.cells:
+        for cell in study.definition.cells:
             self._worths[cell.name] = self._cell_worths(study, cell)
             self._reluctance[cell.name] = 1 + RELUCTANCE_STEP * place[cell.framing]
 
