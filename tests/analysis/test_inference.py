@@ -324,5 +324,6 @@ def test_familiarity_that_does_not_vary_says_nothing(three, table):
     )
     few = familiarity_interaction(table(three[0].chosen(np.arange(3))), FAST)
     assert few.empty and any(
-        "3 participants judged every technique" in note for note in few.attrs["notes"]
+        "3 participants rated themselves and judged every technique" in note
+        for note in few.attrs["notes"]
     )
