@@ -199,7 +199,7 @@ class Frame:
         self.renderer, self.view, self.picture = renderer, view, picture
         s = renderer.supersample
         self.width, self.height = renderer.size[0] * s, renderer.size[1] * s
-        self._given: dict[tuple[int, bool], gl.Target] = {}
+        self._given: dict[tuple[int, bool, float], gl.Target] = {}
         self._shared = {
             "camera_position": view.eye,
             "view": view.view,
@@ -233,14 +233,16 @@ class Frame:
         for hair in r.hair:
             hair.draw(r.program, r.lamps, r.surroundings, self._shared, self.view.pixels_per_mm)
 
-    def irradiance(self, translucent: bool, medium: int = 1) -> gl.Texture:
+    def irradiance(self, translucent: bool, medium: int = 1, texturing: float = 0.0) -> gl.Texture:
         """The input of the techniques: irradiance, alpha 1 where this medium scatters.
 
-        translucent: with the transmitted light of Jimenez 2010 added.
+        translucent: with the transmitted light of Jimenez 2010 added; texturing: times the albedo
+        to this power, which the composite then leaves out.
         """
-        if not translucent and len(self.renderer.media) <= 1:
+        if not translucent and not texturing and len(self.renderer.media) <= 1:
             return self.surface.textures[0]
-        if (medium, translucent) not in self._given:
+        key = (medium, translucent, texturing)
+        if key not in self._given:
             target = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
             target.bind()
             self.renderer.program("passes/add.frag").use(
@@ -248,10 +250,12 @@ class Frame:
                 transmitted=self.surface.textures[4],
                 medium=float(medium),
                 through=float(translucent),
+                albedo=self.surface.textures[2],
+                texturing=texturing,
             )
             gl.draw_fullscreen(self.renderer.context)
-            self._given[medium, translucent] = target
-        return self._given[medium, translucent].textures[0]
+            self._given[key] = target
+        return self._given[key].textures[0]
 
     def inputs(
         self,
@@ -259,13 +263,14 @@ class Frame:
         irradiance: gl.Texture | None = None,
         depth_normal: gl.Texture | None = None,
         medium: int = 1,
+        texturing: float = 0.0,
     ) -> Inputs:
         """What a technique gets; the textures can be replaced (tests use a flat patch)."""
         r = self.renderer
         return Inputs(
             r.context,
             r.program,
-            irradiance or self.irradiance(translucent, medium),
+            irradiance or self.irradiance(translucent, medium, texturing),
             depth_normal or self.surface.textures[3],
             self.width,
             self.height,
@@ -277,7 +282,8 @@ class Frame:
     def scatter(self, technique: Technique) -> gl.Target:
         """Scattered irradiance and counts of all media: one pass of the technique for each."""
         media = range(1, max(1, len(self.renderer.media)) + 1)
-        first = technique.scatter(self.inputs(technique.translucent, medium=1)).target
+        given = {"translucent": technique.translucent, "texturing": technique.texturing}
+        first = technique.scatter(self.inputs(**given, medium=1)).target
         if len(media) == 1:
             return first
         total = gl.Target(self.width, self.height, output_formats())
@@ -288,7 +294,7 @@ class Frame:
         GL.glDrawBuffers(2, [GL.GL_COLOR_ATTACHMENT0, GL.GL_COLOR_ATTACHMENT1])
         for medium in media:
             if medium > 1:
-                first = technique.scatter(self.inputs(technique.translucent, medium=medium)).target
+                first = technique.scatter(self.inputs(**given, medium=medium)).target
             total.bind()
             self.renderer.program("passes/pick.frag").use(
                 irradiance=self.surface.textures[0],
@@ -316,6 +322,7 @@ class Frame:
                 self.view,
                 r.surroundings,
                 r.supersample,
+                technique.texturing,
             )
             counts = info.read()
         contrast = counts[..., 1].copy() if technique.measures_contrast else None
@@ -331,7 +338,7 @@ class Frame:
         spent = {name: np.empty((rounds, 2)) for name in techniques}
         for k in range(-1, rounds):
             for name, technique in techniques.items():
-                self.irradiance(technique.translucent)
+                self.irradiance(technique.translucent, texturing=technique.texturing)
                 gl.finish()
                 start = np.array([time.perf_counter(), time.process_time()])
                 scattered = self.scatter(technique)

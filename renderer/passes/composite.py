@@ -23,14 +23,19 @@ def composite(
     view: View,
     surroundings: Surroundings,
     supersample: int,
+    texturing: float = 0.0,
 ) -> np.ndarray:
-    """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers."""
+    """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers.
+
+    texturing: the power of the albedo that scattered light has already been multiplied by.
+    """
     width, height = surface.width, surface.height
     _, specular, albedo, depth_normal, _ = surface.textures
     programs_uniforms = {
         "scattered": scattered,
         "specular": specular,
         "albedo": albedo,
+        "texturing": texturing,
         "depth_normal": depth_normal,
         "hair": hair.textures[0],
         "exposure": picture.exposure,

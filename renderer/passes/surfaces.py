@@ -22,8 +22,6 @@ from renderer.scene.graph import Contents, Item
 from renderer.scene.material import Material, Skin
 from renderer.scene.model import MASKS
 
-THICKNESS_SCALE = 0.38  # mm of slab per mm of depth-map thickness
-TRANSMISSION_WRAP = 0.10  # E = saturate(wrap + L . -N): 0 is exact, the published shader uses 0.3
 #: Irradiance and the material's id; specular; albedo; depth and normal; what comes through.
 FORMATS = (GL.GL_RGBA32F, GL.GL_RGBA16F, GL.GL_RGBA16F, GL.GL_RGBA32F, GL.GL_RGBA16F)
 #: The same over an atlas or points, with the place in the world.
@@ -183,8 +181,8 @@ class Surfaces:
             "roughness_oily": skin.roughness_oily,
             "gaussian_falloff": 0.5 / through.variance_mm2,
             "gaussian_weight": through.weights,
-            "thickness_scale": THICKNESS_SCALE,
-            "transmission_wrap": TRANSMISSION_WRAP,
+            "thickness_scale": material.thickness_scale,
+            "transmission_wrap": material.transmission_wrap,
         }
 
     def points(self, drawn: Drawn, faces: np.ndarray, weights: np.ndarray) -> gl.Mesh:

@@ -48,6 +48,20 @@ class Material(Parameters):
         (0.85, 1.5), unit="of the roughness", low=0.1, high=3.0, source="chosen by eye"
     )
     lobe_share: float = parameter(0.25, source="of the second lobe, chosen by eye", **_SHARE)
+    thickness_scale: float = parameter(
+        0.38,
+        unit="mm of slab per mm of a lamp's depth map",
+        low=0.0,
+        high=100.0,
+        source="chosen by eye; 1 is exact for a flat part",
+    )
+    transmission_wrap: float = parameter(
+        0.10,
+        unit="added to the cosine",
+        low=0.0,
+        high=1.0,
+        source="chosen by eye; 0 is exact, the published shader uses 0.3",
+    )
     albedo_map: str = ""
     normal_map: str = ""
     roughness_map: str = ""

@@ -9,7 +9,7 @@ import numpy as np
 
 from renderer.errors import InputError
 from renderer.optics.curve import Curve, edge_error
-from renderer.parameters import Parameters
+from renderer.parameters import Parameters, parameter
 
 if TYPE_CHECKING:
     from renderer import gl
@@ -51,15 +51,25 @@ class Scattered:
 class Technique(Parameters):
     """Base of all techniques.
 
-    `translucent`: transmitted light is added before scattering; `measures_contrast`: it writes
-    contrast. Kernels are fitted to the medium's curve: `edge` is what the kernel for a curve
-    answers to a straight edge, and `fit_error` how far that is from the curve's own answer.
+    translucent: light that comes through thin parts is added before scattering (Jimenez et al.
+    2010). texturing: the share of the albedo's exponent that is applied before scattering: 0
+    post-scatter, 1 pre-scatter, 0.5 both. `measures_contrast`: it writes contrast. Kernels are
+    fitted to the medium's curve: `edge` is what the kernel for a curve answers to a straight edge,
+    and `fit_error` how far that is from the curve's own answer.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     paper: ClassVar[str]
-    translucent: ClassVar[bool] = True
+    translucent: bool = parameter(True, source="Jimenez et al. 2010, doi:10.1109/MCG.2010.39")
+    texturing: float = parameter(
+        0.0,
+        unit="of the albedo's exponent before scattering",
+        low=0.0,
+        high=1.0,
+        source="d'Eon and Luebke 2007, sec. 14.4.5: post (0), pre (1), or both (0.5)",
+    )
+
     measures_contrast: ClassVar[bool] = False
 
     @classmethod

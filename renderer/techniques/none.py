@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from renderer.optics.curve import Curve
+from renderer.parameters import parameter
 from renderer.techniques.screen import ScreenTechnique
 
 
@@ -18,7 +19,7 @@ class NoScattering(ScreenTechnique):
     name: ClassVar[str] = "none"
     title: ClassVar[str] = "No SSS"
     paper: ClassVar[str] = "Lambert 1760, Photometria"
-    translucent: ClassVar[bool] = False
+    translucent: bool = parameter(False, source="light that comes through is scattered light")
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         return np.repeat((np.asarray(x_mm)[:, None] < 0) * 1.0, curve.channels, axis=1)

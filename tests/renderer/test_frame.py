@@ -79,8 +79,36 @@ def test_the_light_that_comes_through_is_added_for_scattering_techniques_alone(f
     np.testing.assert_array_equal(plain[~mask], lit[~mask])
     gain = (lit - plain)[mask][:, :3]
     assert (gain >= 0).all() and gain[:, 0].max() > 0.3 and gain[:, 0].sum() > 2 * gain[:, 2].sum()
-    assert not renderer.TECHNIQUES["none"].translucent
-    assert all(kind.translucent for name, kind in renderer.TECHNIQUES.items() if name != "none")
+    assert [name for name in renderer.TECHNIQUES if not renderer.make(name).translucent] == ["none"]
+
+
+def test_texturing_before_and_after_agree_where_nothing_is_to_blur(frames):
+    """Without scattering, pre, post and both are one picture; with it, pre blurs the albedo too."""
+    frame = frames["close-up"]
+    post, both, pre = (
+        frame.render(renderer.make("none", {"texturing": share})).image.astype(int)
+        for share in (0.0, 0.5, 1.0)
+    )
+    assert np.abs(post - pre).max() <= 1 and np.abs(post - both).max() <= 1
+    post, pre = (
+        frame.render(renderer.make("golubev", {"texturing": share})) for share in (0.0, 1.0)
+    )
+    skin = post.samples[::2, ::2] > 0
+    rough = [
+        np.abs(np.diff(r.image.astype(float), axis=1))[skin[:, 1:]].mean() for r in (post, pre)
+    ]
+    assert rough[1] < rough[0]
+    eyes = ~no_skin(post)
+    np.testing.assert_array_equal(post.image[~eyes], pre.image[~eyes])
+
+
+def test_translucency_is_a_parameter(frames):
+    frame = frames["close-up"]
+    lit, dull = (
+        frame.render(renderer.make("golubev", {"translucent": on})).image.astype(int)
+        for on in (True, False)
+    )
+    assert (lit - dull)[..., 0].max() > 20 and (lit >= dull - 1).all()
 
 
 def test_a_frame_drawn_twice_has_the_same_bytes(model, stand, results):
