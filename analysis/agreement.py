@@ -26,7 +26,7 @@ from scipy import stats
 from analysis import bootstrap, inference, worth
 from analysis.codebook import FRAMING, Codebook
 from analysis.options import FEWEST_PEOPLE, OVERALL, Exclusions, Options
-from analysis.panel import Panel, by_pair, noted, panels
+from analysis.panel import Panel, by_pair, panels, with_notes
 from analysis.responses import Responses
 
 PARTICIPANTS = (
@@ -101,7 +101,7 @@ def agreement(responses: Responses, options: Options) -> pd.DataFrame:
             *_times(name, responses, panel, options),
         ]
         rows += [(name, *one) for one in found]
-    return noted(rows, ["framing", "statistic", "value", "low", "high", "p"], notes)
+    return with_notes(rows, ["framing", "statistic", "value", "low", "high", "p"], notes)
 
 
 def participants(responses: Responses, options: Options) -> pd.DataFrame:
@@ -218,7 +218,7 @@ def side_balance(responses: Responses, options: Options) -> pd.DataFrame:
         if reason:
             notes.append(f"{name}: {reason}")
     columns = ["framing", "technique", "left", "right", "left_share", "p", "holm_p"]
-    return noted(rows, columns, notes)
+    return with_notes(rows, columns, notes)
 
 
 def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
@@ -240,7 +240,7 @@ def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
     everyone = _conclusions(responses, lean)
     notes = [f"{len(out)} of {len(table)} participants are excluded: {rules_in_words(options)}"]
     if len(out) == len(table):
-        return noted([], columns, [*notes, "nobody is left: no comparison"])
+        return with_notes([], columns, [*notes, "nobody is left: no comparison"])
     rest = everyone
     if len(out):
         frame = responses.frame[~responses.frame.participant.isin(out)].reset_index(drop=True)
@@ -250,7 +250,7 @@ def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
         (*key, value, rest.get(key, ""), int(value != rest.get(key, "")))
         for key, value in everyone.items()
     ]
-    return noted(rows, columns, notes)
+    return with_notes(rows, columns, notes)
 
 
 def _conclusions(responses: Responses, options: Options) -> dict[tuple[str, str, str, str], str]:
@@ -616,7 +616,7 @@ def _sides(name: str, panel: Panel, options: Options, notes: list[str]) -> list[
     ]
     if "ordinal" not in options.models:
         return rows
-    fit = None if worth.missing_fit(panel, "ordinal") else worth.fitted(panel)
+    fit = None if worth.impossible(panel, "ordinal") else worth.ordinal_fit(panel, options)
     if fit is None:
         notes.append(f"{name}: no side_effect: the ordinal model has no fit, see worths")
         return [*rows, ("side_effect", np.nan, np.nan, np.nan, np.nan)]

@@ -19,7 +19,7 @@ import pandas as pd
 from analysis import bootstrap
 from analysis.errors import InputError
 from analysis.options import Options
-from analysis.panel import Panel, by_pair, noted, panels
+from analysis.panel import Panel, by_pair, panels, with_notes
 from analysis.responses import Responses
 
 #: Random index for matrices of 1 to 10 items; Saaty's, as in table 5.3 of the thesis. Other tools
@@ -251,7 +251,7 @@ def priority_intervals(responses: Responses, options: Options) -> pd.DataFrame:
                 low, high = bootstrap.interval(solve(drawn), panel.people, options.level)
                 values = zip(panel.items, solve(matrix), low, high, strict=True)
                 rows += [(name, aggregation, method, *value) for value in values]
-    return noted(
+    return with_notes(
         rows, ["framing", "aggregation", "method", "technique", "priority", "low", "high"], notes
     )
 
@@ -301,7 +301,7 @@ def consistency_intervals(responses: Responses, options: Options) -> pd.DataFram
                     *(again or ("", "", np.nan, np.nan)),
                 )
             )
-    return noted(rows, columns, notes)
+    return with_notes(rows, columns, notes)
 
 
 def _matrices(panel: Panel, aggregation: str, options: Options) -> tuple[np.ndarray, np.ndarray]:

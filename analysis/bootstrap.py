@@ -23,7 +23,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis.options import FEWEST_PEOPLE, Options
-from analysis.panel import Panel, by_pair, noted, panels
+from analysis.panel import Panel, by_pair, panels, with_notes
 from analysis.responses import Responses
 
 #: An interval is given where at least this share of the resamples has an estimate.
@@ -118,9 +118,9 @@ def score_intervals(responses: Responses, options: Options) -> pd.DataFrame:
         rows += zip(
             [name] * len(panel.items), panel.items, points.sum(axis=0), low, high, strict=True
         )
-    return noted(rows, ["framing", "technique", "score", "low", "high"], few(responses)).astype(
-        {"score": int}
-    )
+    return with_notes(
+        rows, ["framing", "technique", "score", "low", "high"], few(responses)
+    ).astype({"score": int})
 
 
 def median_intervals(responses: Responses, options: Options) -> pd.DataFrame:
@@ -137,7 +137,7 @@ def median_intervals(responses: Responses, options: Options) -> pd.DataFrame:
         for k, (a, b) in enumerate(combinations(panel.items, 2)):
             if n := int(given[k].sum()):
                 rows.append((name, a, b, n, middle[k], low[k], high[k]))
-    return noted(
+    return with_notes(
         rows, ["framing", "a", "b", "n", "median_preference", "low", "high"], few(responses)
     )
 

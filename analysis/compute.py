@@ -24,17 +24,26 @@ what the levels hold, under the name 'all'.
                     aggregation median|geometric_mean, method eigenvector|row_geometric_mean
     ahp_consistency framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,judgement,consistent
                     a,b: the judgement to look at again, 'consistent' what the others imply
-    worths          framing,model,technique,estimate,low,high
-                    centred on 0 within a framing
+    worths          framing,model,technique,estimate,low,high,fit
+                    centred on 0 within a framing; fit: 'maximum likelihood', or what stands in
     worth_models    framing,model,parameter,estimate,low,high
                     ties, side effect, spread of people
+    goodness        framing,model,parameters,log_likelihood,deviance,df,p
+                    how well a model describes the pairs
     pairs           framing,a,b,n,strong_a,slight_a,none,slight_b,strong_b,wilcoxon_p,sign_p,holm_p,
                     tost_p,wilcoxon_method,mean_preference,low,high,equivalence_low,
                     equivalence_high,tost_holm_p,equivalent,rank_biserial,dz,jod,jod_low,jod_high,
-                    jod_equivalent
+                    jod_equivalent,simultaneous_low,simultaneous_high,jod_simultaneous_low,
+                    jod_simultaneous_high,rank_biserial_low,rank_biserial_high,dz_low,dz_high
                     jod: worth of b less worth of a
+    contrasts       framing,a,b,estimate,low,high,p,holm_p
+                    differences of worths from all answers of a framing, points
+    omnibus         framing,question,people,size,p
+                    any difference, additivity, interaction of technique and framing
     trend           statistic,value,low,high,p
                     preference against distance
+    order_effects   statistic,people,value,low,high,p
+                    fatigue, and what the question before does
     agreement       framing,statistic,value,low,high,p
     side_balance    framing,technique,left,right,left_share,p,holm_p
                     on which side each technique stood
@@ -87,8 +96,12 @@ def everything(responses: Responses, options: Options | None = None) -> Results:
         "ahp_consistency": ahp.consistency_intervals(responses, options),
         "worths": worth.worths(responses, options),
         "worth_models": worth.parameters(responses, options),
+        "goodness": worth.goodness(responses, options),
         "pairs": inference.pairs(responses, options),
+        "contrasts": inference.contrasts(responses, options),
+        "omnibus": inference.omnibus(responses, options),
         "trend": inference.trend(responses, options),
+        "order_effects": inference.order_effects(responses, options),
         "agreement": agreement.agreement(responses, options),
         "side_balance": agreement.side_balance(responses, options),
         "participants": agreement.participants(responses, options),

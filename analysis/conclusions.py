@@ -21,7 +21,7 @@ from analysis.options import OVERALL, Options
 from analysis.shown import number, probability
 from analysis.worth_figures import framing_label
 
-SPOKEN = {
+MODEL_NAMES = {
     "bradley_terry": "Bradley and Terry's model",
     "davidson": "Davidson's model",
     "thurstone_jod": "Thurstone's case V",
@@ -52,7 +52,11 @@ def conclude(
     alpha = alpha_of(options)
     pairs = tables["pairs"]
     for framing, rows in pairs[pairs.framing != OVERALL].groupby("framing", sort=False):
-        _about_pairs(found, framing_label(codebook, framing), rows, codebook, options, alpha, who)
+        where = framing_label(codebook, framing)
+        _about_pairs(found, where, rows, codebook, options, alpha, who)
+        _about_disagreements(found, where, rows, _of(tables, "contrasts", framing), codebook, alpha)
+        _about_jod_margin(found, where, rows, codebook, options, alpha)
+    _about_interaction(found, tables, codebook, alpha)
     if not (options.margin or options.margin_jod):
         found.cannot.append(
             "No margin of equivalence was declared before the data, so that no two "
@@ -60,11 +64,13 @@ def conclude(
             "that a test finds no difference does not make them equal."
         )
     _about_trend(found, tables["trend"], codebook, alpha)
+    _about_order(found, tables, alpha)
     _about_agreement(found, tables["agreement"], codebook, alpha, who.capitalize())
     _about_sides(found, tables, notes, codebook, alpha, who.capitalize())
     _about_familiarity(found, tables["familiarity_interaction"], codebook, alpha)
     _about_exclusions(found, tables["participants"], tables["sensitivity"], people)
     _about_fits(found, notes.get("worths", ()), codebook)
+    _about_spread(found, tables, codebook)
     found.cannot.append(
         "Nothing here says how people judge, since a program answered."
         if simulated
@@ -159,6 +165,205 @@ def _about_pairs(
                 f"{'is' if len(undecided) == 1 else 'are'} undecided: {tail} for "
                 f"{_pairs(undecided, codebook)}."
             )
+
+
+def _of(tables: Mapping[str, pd.DataFrame], name: str, framing: str) -> pd.DataFrame:
+    """The rows of a table at a framing; none where the table was not made."""
+    if name not in tables:
+        return pd.DataFrame({"a": [], "b": []})
+    return tables[name][tables[name].framing == framing]
+
+
+def _about_disagreements(
+    found: Conclusions,
+    where: str,
+    rows: pd.DataFrame,
+    contrasts: pd.DataFrame,
+    codebook: Codebook,
+    alpha: float,
+) -> None:
+    """Where an interval or another model says otherwise than the declared test: a sentence for each
+    kind of disagreement.
+    """
+    level = f"{100 * (1 - alpha):g} %"
+    undecided = [row for row in rows.itertuples() if verdict(row, alpha) == "undecided"]
+    other = {(row.a, row.b): row for row in contrasts.itertuples()}
+
+    def excludes(row: object, low: str, high: str) -> bool:
+        return getattr(row, low) > 0 or getattr(row, high) < 0
+
+    alone, together = [], []
+    for row in undecided:
+        if excludes(row, "jod_simultaneous_low", "jod_simultaneous_high") or excludes(
+            row, "simultaneous_low", "simultaneous_high"
+        ):
+            together.append(row)
+        elif excludes(row, "jod_low", "jod_high") or excludes(row, "low", "high"):
+            alone.append(row)
+    if alone:
+        found.cannot.append(
+            f"{where}: of the undecided pairs, an interval at {level} of the mean preference or of "
+            f"the JOD difference, which is that of one pair alone, excludes 0 for "
+            f"{_pairs(alone, codebook)}; adjusted for all pairs of the family it does not, so that "
+            "no difference is concluded."
+        )
+    if together:
+        found.cannot.append(
+            f"{where}: an adjusted interval, of the mean preference or of the JOD difference "
+            f"(from answers about all pairs), excludes 0 for {_pairs(together, codebook)}, where "
+            "the declared test does not decide; the declared test stands."
+        )
+    by_model = [
+        row
+        for row in undecided
+        if row not in together and (row.a, row.b) in other and other[row.a, row.b].holm_p <= alpha
+    ]
+    if by_model:
+        found.cannot.append(
+            f"{where}: the contrast of the linear model, from the answers about all pairs, differs "
+            f"from 0 after Holm's correction for {_pairs(by_model, codebook)}, where the declared "
+            "test does not decide; the declared test stands."
+        )
+    against = [
+        row
+        for row in rows.itertuples()
+        if verdict(row, alpha) in ("different", "both")
+        and np.isfinite(row.simultaneous_low)
+        and not excludes(row, "simultaneous_low", "simultaneous_high")
+    ]
+    if against:
+        found.can.append(
+            f"{where}: for {_pairs(against, codebook)} the declared test finds a difference while "
+            "the adjusted interval of the mean preference holds 0: it guards all pairs in one "
+            "step, Holm's correction in several, and the declared test stands."
+        )
+
+
+def _about_jod_margin(
+    found: Conclusions,
+    where: str,
+    rows: pd.DataFrame,
+    codebook: Codebook,
+    options: Options,
+    alpha: float,
+) -> None:
+    """Which pairs meet the margin in JOD, beside a margin in points that decides."""
+    if not options.margin_jod or not options.margin:
+        return
+    margin = options.margin_jod
+    meet = [row for row in rows.itertuples() if row.jod_equivalent == 1]
+    inner = f"{100 * (1 - 2 * alpha):g} %"
+    if not meet:
+        found.cannot.append(
+            f"{where}: no pair meets the declared margin of {margin:g} JOD by the {inner} interval "
+            "of its JOD difference."
+        )
+        return
+    sure = [
+        row
+        for row in meet
+        if -margin < row.jod_simultaneous_low and row.jod_simultaneous_high < margin
+    ]
+    differ = [row for row in meet if verdict(row, alpha) not in ("equivalent", "both")]
+    words = (
+        f"{where}: {count(len(meet), 'pair')} of {len(rows)} "
+        f"{'meets' if len(meet) == 1 else 'meet'} the declared margin of {margin:g} JOD by "
+        f"the {inner} interval of the JOD difference, which is not adjusted for the number of "
+        f"pairs: {_pairs(meet, codebook)}; adjusted for all pairs, "
+        f"{_pairs(sure, codebook) if sure else 'none'}."
+    )
+    if differ:
+        words += (
+            f" The declared tests in points do not call {_pairs(differ, codebook)} equal, "
+            "and they stand."
+        )
+    found.cannot.append(words)
+
+
+def _about_interaction(
+    found: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook, alpha: float
+) -> None:
+    """Whether the order of techniques changes from framing to framing, and what pooling means."""
+    if "omnibus" not in tables:
+        return
+    table = tables["omnibus"]
+    for row in table[(table.question == "interaction") & table.p.notna()].itertuples():
+        together = framing_label(codebook, OVERALL)
+        if row.p <= alpha:
+            found.can.append(
+                f"What is preferred depends on the {codebook.level} (interaction of technique and "
+                f"{codebook.level}, sign flips of people, p {_equals(row.p)}): '{together}' "
+                "averages over orders that differ, and is no order of its own."
+            )
+        else:
+            found.cannot.append(
+                f"Whether what is preferred depends on the {codebook.level}: no interaction of "
+                f"technique and {codebook.level} is shown (sign flips of people, p "
+                f"{_equals(row.p)})."
+            )
+    apart = table[(table.question == "additivity") & (table.p <= alpha)]
+    if len(apart):
+        words = listed(
+            [
+                f"{framing_label(codebook, row.framing)} (p {_equals(row.p)})"
+                for row in apart.itertuples()
+            ]
+        )
+        found.cannot.append(
+            f"No scale of worths describes the pairs at {words}: their differences do not add up; "
+            "read the pairs one by one there."
+        )
+
+
+def _about_order(found: Conclusions, tables: Mapping[str, pd.DataFrame], alpha: float) -> None:
+    """Effects of the place in the order and of the question before."""
+    if "order_effects" not in tables:
+        return
+    names = {
+        "strength_slope": "the strength of an answer changes by {} points over ten questions",
+        "side_slope": "answers drift by {} points to the right over ten questions",
+        "time_slope": "the time of an answer changes by a factor of {} over ten questions",
+        "carry_over": (
+            "two questions in a row are answered for the same side more often than chance by {}"
+        ),
+    }
+    words = []
+    for row in tables["order_effects"].itertuples():
+        if row.p <= alpha:
+            value = (
+                number(float(np.exp(row.value)))
+                if row.statistic == "time_slope"
+                else number(row.value, sign=True)
+            )
+            words.append(f"{names[row.statistic].format(value)} (p {_equals(row.p)})")
+    if words:
+        found.can.append(
+            f"The order of questions matters: {'; '.join(words)}. Orders are random for each "
+            "person where the study shuffles them, so that this widens intervals and favours no "
+            "technique."
+        )
+
+
+def _about_spread(
+    found: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook
+) -> None:
+    """How far people differ in taste, beside how far techniques differ."""
+    if "worth_models" not in tables:
+        return
+    models, worths = tables["worth_models"], tables["worths"]
+    parts = []
+    for row in models[(models.parameter == "sd_preference")].itertuples():
+        here = worths[(worths.framing == row.framing) & (worths.model == "ordinal")].estimate
+        if row.framing != OVERALL and np.isfinite(row.estimate) and len(here):
+            parts.append(
+                f"{number(row.estimate)} at {framing_label(codebook, row.framing)}, where "
+                f"techniques' worths span {number(here.max() - here.min())}"
+            )
+    if parts:
+        found.can.append(
+            "People's own tastes for a technique spread by so many logits (standard deviation, "
+            f"ordinal model): {'; '.join(parts)}."
+        )
 
 
 def _about_trend(found: Conclusions, trend: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
@@ -341,19 +546,32 @@ def _pairs(rows: list, codebook: Codebook) -> str:
 
 
 def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) -> None:
-    """Fits that do not exist, from the notes 'FRAMING, MODEL: no finite worths: REASON', models of
-    one reason together.
+    """Fits that do not exist, and those that another one stands in for, from the notes
+    'FRAMING, MODEL: ...: REASON', models of one reason together.
     """
-    models: dict[tuple[str, str], list[str]] = {}
+    refused: dict[tuple[str, str], list[str]] = {}
+    replaced: dict[tuple[str, str], list[str]] = {}
     for line in notes:
-        head, mark, reason = line.partition(": no finite worths: ")
-        framing, _, model = head.rpartition(", ")
-        if mark:
-            models.setdefault((framing, reason.rstrip(".")), []).append(SPOKEN.get(model, model))
-    for (framing, reason), names in models.items():
+        for mark, models in (
+            (": no finite worths: ", refused),
+            (": maximum likelihood has no finite worths, since ", replaced),
+        ):
+            head, here, reason = line.partition(mark)
+            framing, _, model = head.rpartition(", ")
+            if here:
+                reason = reason.rpartition(": ")[0] if models is replaced else reason
+                key = framing, reason.rstrip(".")
+                models.setdefault(key, []).append(MODEL_NAMES.get(model, model))
+    for (framing, reason), names in refused.items():
         found.cannot.append(
             f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: "
             f"{_with_labels(reason, codebook)}."
+        )
+    for (framing, reason), names in replaced.items():
+        found.cannot.append(
+            f"{framing_label(codebook, framing)}: how far apart techniques are by {listed(names)} "
+            f"is open on one side: {_with_labels(reason, codebook)}, so that maximum likelihood "
+            "has no finite worths; fits with reduced bias or weak priors stand in and are marked."
         )
 
 

@@ -58,6 +58,8 @@ class Options:
                 one framing
     ties        how bradley_terry and thurstone_jod take 'no difference': 'half' a win for each, or
                 'drop'
+    fallback    what stands in where maximum likelihood has no finite maximum: 'reduced_bias' (for
+                the ordinal model weak priors), or 'none'
     models      the models of worth to fit
     exclusions  see `Exclusions`
     declared    names of the choices that a study declared, rules as 'exclusions.NAME'; the others
@@ -72,6 +74,7 @@ class Options:
     test: str = "wilcoxon"
     family: str = "study"
     ties: str = "half"
+    fallback: str = "reduced_bias"
     models: tuple[str, ...] = ("bradley_terry", "davidson", "thurstone_jod", "ordinal")
     exclusions: Exclusions = field(default_factory=Exclusions)
     declared: tuple[str, ...] = ()
@@ -93,6 +96,7 @@ class Options:
             ("test", ("wilcoxon", "sign")),
             ("family", ("study", "framing")),
             ("ties", ("half", "drop")),
+            ("fallback", ("reduced_bias", "none")),
         ):
             if getattr(self, name) not in known:
                 raise InputError(

@@ -227,7 +227,7 @@ def _placed(panel: Panel, values: np.ndarray) -> np.ndarray:
     return (values @ places).reshape(*values.shape[:-1], n, n)
 
 
-def noted(rows: Iterable, columns: Iterable[str], notes: Iterable[str] = ()) -> pd.DataFrame:
+def with_notes(rows: Iterable, columns: Iterable[str], notes: Iterable[str] = ()) -> pd.DataFrame:
     """A table whose attrs['notes'] say, one line each, what was refused and why, and which variant
     was used.
     """

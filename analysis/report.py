@@ -36,7 +36,6 @@ from analysis.conclusions import count as _count
 from analysis.conclusions import listed as _listed
 from analysis.declared import UNDECLARED
 from analysis.errors import InputError
-from analysis.inference import alpha_of
 from analysis.methods import rejected_rows
 from analysis.methods import versions as _versions
 from analysis.objective import Measured
@@ -119,10 +118,8 @@ def report_responses(
     if responses.simulated:
         tables = {name: table.assign(simulated=1) for name, table in tables.items()}
 
-    simulated, alpha = responses.simulated, alpha_of(options)
-    pictures = worth_figures.draw_results(
-        results.tables, codebook, options.margin, alpha, simulated
-    )
+    simulated = responses.simulated
+    pictures = worth_figures.draw_results(results.tables, codebook, options, simulated)
     said = list(unmeasured)
     if measured is not None:
         for measure, rows in beside.groupby("measure", sort=False):

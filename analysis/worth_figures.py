@@ -19,8 +19,8 @@ from matplotlib.ticker import MaxNLocator
 from analysis import figures
 from analysis.codebook import FRAMING, Codebook
 from analysis.figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
-from analysis.inference import verdict
-from analysis.options import OVERALL
+from analysis.inference import alpha_of, verdict
+from analysis.options import OVERALL, Options
 
 #: Model -> its name and the unit of its worths.
 MODELS = {
@@ -56,14 +56,14 @@ def framing_label(codebook: Codebook, name: str) -> str:
 def draw_results(
     tables: Mapping[str, pd.DataFrame],
     codebook: Codebook,
-    margin: float | None,
-    alpha: float,
+    options: Options,
     simulated: bool,
 ) -> list[Picture]:
     """The figures of `compute.everything`'s tables, without those that have nothing to show."""
+    level, alpha = 100 * options.level, alpha_of(options)
     drawn = [
-        draw_pairs(tables["pairs"], codebook, margin, alpha, simulated),
-        draw_ladder(tables["worths"], codebook, simulated),
+        draw_pairs(tables["pairs"], codebook, options.margin, alpha, simulated),
+        draw_ladder(tables["worths"], codebook, simulated, options.ties, level),
         draw_worths(tables["worths"], codebook, simulated),
         draw_scores(tables["tallies"], codebook, simulated),
         draw_agreement(tables["agreement"], codebook, simulated),
@@ -164,21 +164,72 @@ def _interval(
     )
 
 
+def jod_meaning(ties: str) -> str:
+    """What 1 JOD is under the declared handling of 'no difference', in a sentence."""
+    if ties == "half":
+        return (
+            "1 JOD apart: the answers that prefer the upper one and half of those that see no "
+            "difference are 75 % of all answers; the more ties, the fewer prefer it."
+        )
+    return (
+        "1 JOD apart: of the answers that prefer one of the two, 75 % prefer the upper one; "
+        "answers 'no difference' are left out."
+    )
+
+
+def stand_ins(found: pd.DataFrame, codebook: Codebook) -> str:
+    """A sentence that names the framings whose fit is not maximum likelihood."""
+    if "fit" not in found:
+        return ""
+    names = [
+        framing_label(codebook, name)
+        for name in dict.fromkeys(found.framing[~found.fit.isin(["maximum likelihood", ""])])
+    ]
+    if not names:
+        return ""
+    return (
+        f" Marked with an asterisk: {', '.join(names)}, where maximum likelihood has no finite "
+        "worths and a fit with reduced bias (or weak priors) stands in."
+    )
+
+
+def left_out(model: pd.DataFrame, codebook: Codebook) -> str:
+    """A sentence that names the framings which have no worths at all."""
+    drawn = set(model.framing[model.estimate.notna()])
+    names = [
+        framing_label(codebook, name) for name in dict.fromkeys(model.framing) if name not in drawn
+    ]
+    return f" Not drawn, since they have no worths: {', '.join(names)}." if names else ""
+
+
+def starred(framing: str, found: pd.DataFrame, codebook: Codebook, width: int) -> str:
+    """The framing's label, cut, with an asterisk where a stand-in was fitted."""
+    here = found[found.framing == framing]
+    star = "fit" in found and not here.fit.isin(["maximum likelihood", ""]).all()
+    return figures._cut(framing_label(codebook, framing), width) + (" *" if star else "")
+
+
 def draw_ladder(
-    worths: pd.DataFrame, codebook: Codebook, simulated: bool = False
+    worths: pd.DataFrame,
+    codebook: Codebook,
+    simulated: bool = False,
+    ties: str = "half",
+    level: float = 95,
 ) -> Picture | None:
     """The JOD of all techniques on one vertical scale, one ladder a framing."""
-    found = worths[(worths.model == "thurstone_jod") & worths.estimate.notna()]
+    model = worths[worths.model == "thurstone_jod"]
+    found = model[model.estimate.notna()]
     if found.empty:
         return None
     return figures._picture(
         "jod_ladder",
         "The JOD ladder",
-        "Thurstone case V worths in just-objectionable differences: of two techniques 1 JOD "
-        "apart, three of four answers prefer the "
-        "upper one. Bars are intervals over resampled participants; 0 is the mean of the "
-        + codebook.level
-        + ".",
+        "Thurstone case V worths in just-objectionable differences. "
+        + jod_meaning(ties)
+        + f" Bars are intervals at {level:g} % over resampled participants, each of one technique "
+        f"alone; 0 is the mean of the {codebook.level}."
+        + stand_ins(found, codebook)
+        + left_out(model, codebook),
         "; ".join(
             f"{framing_label(codebook, framing)}: "
             + ", ".join(
@@ -228,7 +279,7 @@ def _ladder(found: pd.DataFrame, codebook: Codebook) -> Figure:
                 size=7.5,
             )
         ax.axhline(0, color="#888888", linewidth=0.7, zorder=0)
-        ax.set_title(figures._cut(framing_label(codebook, framing), 20), loc="left")
+        ax.set_title(starred(framing, found, codebook, 18), loc="left")
         ax.set_xlim(-0.25, 1.75)
         ax.set_xticks([])
         ax.spines["bottom"].set_visible(False)
@@ -596,62 +647,68 @@ def _objective(table: pd.DataFrame, about: str, codebook: Codebook) -> Figure:
 
 
 def draw_power(
-    curves: pd.DataFrame, wanted: float, difference: float, correction: str, codebook: Codebook
+    curves: pd.DataFrame, plan: object, names: Mapping[tuple[str, str], str], codebook: Codebook
 ) -> Picture:
-    """Power against people: one row a goal, one panel a design. curves: one framing and correction
-    of `power.plan_table`.
+    """Power against people: one row a goal, one panel a design.
+
+    curves: one framing of `planning.plan_table`; plan: its plan; names: (test, correction) -> what
+    it is called.
     """
     return figures._picture(
         "power",
-        f"How many people find, or exclude, {difference:g} JOD",
+        f"How many people find {plan.difference:g} JOD, or exclude {plan.margin:.3g} points",
         "Share of simulated studies that reach the goal; the dashed line is the wanted "
-        f"power, {wanted:g}; bands are 95 % intervals of "
-        "the simulation, dots the closed form where there is one"
-        + (
-            "."
-            if correction == "none"
-            else "; each test at Holm's first step for the whole family."
-        )
+        f"power, {plan.power:g}; bands are 95 % intervals of the simulation, dots the closed form "
+        "where there is one."
         + (
             ""
             if set(curves.framing) == {"any"}
             else f" Worths of {codebook.framing_label(curves.framing.iloc[0])}."
         ),
         "; ".join(
-            f"{goal}, {design}, {test}: "
+            f"{goal}, {design}, {test}, {correction}: "
             + ", ".join(
                 f"{row.people} people {row.power:.2f}"
                 for row in rows.iloc[:: max(1, len(rows) // 5)].itertuples()
             )
-            for (goal, design, test), rows in curves.groupby(["goal", "design", "test"], sort=False)
+            for (goal, design, test, correction), rows in curves.groupby(
+                ["goal", "design", "test", "correction"], sort=False
+            )
         ),
         _power,
         curves,
-        wanted,
-        difference,
+        plan,
+        names,
         simulated=True,
     )
 
 
-TEST_STYLES = {
-    "sign": ("sign test of the pair", "#8A8A8A", ":"),
-    "wilcoxon": ("Wilcoxon test of the pair", VERMILLION, "--"),
-    "mean": ("t test of the pair", SKY, "-."),
-    "worths": ("worths from all answers", BLUE, "-"),
+#: (test, correction) -> colour and line.
+POWER_STYLES = {
+    ("declared", "family"): (BLUE, "-"),
+    ("declared", "none"): (VERMILLION, "--"),
+    ("contrast", "family"): ("#8A8A8A", ":"),
 }
 
 
-def _power(curves: pd.DataFrame, wanted: float, difference: float) -> Figure:
+def _power(curves: pd.DataFrame, plan: object, names: Mapping[tuple[str, str], str]) -> Figure:
     designs, goals = list(dict.fromkeys(curves.design)), list(dict.fromkeys(curves.goal))
-    figure = Figure(figsize=(WIDTH_IN, 1.75 * len(goals) + 0.55), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 1.75 * len(goals) + 0.75), layout="constrained")
     axes = figure.subplots(len(goals), len(designs), squeeze=False, sharex=True, sharey=True)
+    aims = {
+        "find": f"find {plan.difference:g} JOD",
+        "exclude": f"exclude {plan.margin:.3g} points",
+    }
     for row, goal in enumerate(goals):
         for column, design in enumerate(designs):
             ax = axes[row, column]
-            ax.axhline(wanted, color=INK, linewidth=0.7, linestyle="--")
-            for test, (_, colour, line) in TEST_STYLES.items():
+            ax.axhline(plan.power, color=INK, linewidth=0.7, linestyle="--")
+            for (test, correction), (colour, line) in POWER_STYLES.items():
                 here = curves[
-                    (curves.goal == goal) & (curves.design == design) & (curves.test == test)
+                    (curves.goal == goal)
+                    & (curves.design == design)
+                    & (curves.test == test)
+                    & (curves.correction == correction)
                 ]
                 if len(here):
                     ax.fill_between(
@@ -668,18 +725,19 @@ def _power(curves: pd.DataFrame, wanted: float, difference: float) -> Figure:
             ax.set_xticks(ticks, [str(people) for people in ticks])
             ax.minorticks_off()
             ax.set_ylim(0, 1.02)
-            ax.set_title(f"{goal} {difference:g} JOD, {design}", loc="left", size=8)
+            ax.set_title(f"{aims[goal]}, {design}", loc="left", size=8)
             ax.tick_params(labelbottom=True, labelleft=True)
             ax.grid()
             if row == len(goals) - 1:
                 ax.set_xlabel("people")
     figure.supylabel("power", size=8)
-    used = [test for test in TEST_STYLES if test in set(curves.test)]
+    kinds = dict.fromkeys(zip(curves.test, curves.correction, strict=True))
+    used = [kind for kind in POWER_STYLES if kind in kinds]
     keys = [
-        Line2D([], [], color=TEST_STYLES[test][1], linestyle=TEST_STYLES[test][2], linewidth=1.5)
-        for test in used
+        Line2D([], [], color=POWER_STYLES[kind][0], linestyle=POWER_STYLES[kind][1], linewidth=1.5)
+        for kind in used
     ]
     figure.legend(
-        keys, [TEST_STYLES[test][0] for test in used], loc="outside lower center", ncols=len(used)
+        keys, [names[kind] for kind in used], loc="outside lower center", ncols=1, fontsize=7
     )
     return figure

@@ -302,7 +302,8 @@ def _interval(name: str, panel: Panel, options: Options) -> tuple[np.ndarray, np
             for row in agreement._concordance("close-up", panel, Options(resamples=100), [])
         }
         return tuple(np.array([bound]) for bound in rows[name])
-    return worth._worth(panel, name, options)[1:3]
+    fit = worth.fit(panel, name, options)
+    return fit.low, fit.high
 
 
 def main() -> int:

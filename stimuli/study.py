@@ -474,6 +474,7 @@ def _analysis(table: Table) -> dict:
         ("test", ("wilcoxon", "sign")),
         ("family", ("study", "framing")),
         ("ties", ("half", "drop")),
+        ("fallback", ("reduced_bias", "none")),
     ):
         table.take(
             key,

@@ -120,13 +120,10 @@ def worths(
     "--power", "wanted", default=0.8, show_default=True, type=float, help="The power to reach."
 )
 @click.option(
-    "--family",
-    type=int,
-    metavar="N",
-    help=(
-        "Tests that Holm's correction guards together: its first step, alpha/N, is shown "
-        "too. Without it all pairs of all framings."
-    ),
+    "--margin",
+    type=float,
+    metavar="POINTS",
+    help="To exclude: within so many points of 0, from -2 to 2. Without it as the study declares.",
 )
 @click.option(
     "--most", default=400, show_default=True, type=int, help="The most people to think of."
@@ -159,15 +156,15 @@ def command(
     taste: float | None,
     alpha: float | None,
     wanted: float,
-    family: int | None,
+    margin: float | None,
     most: int,
     studies: int,
     seed: int,
 ) -> None:
     """Say how many people the study in STUDY.toml needs to find, or to exclude, a difference.
 
-    Participants are simulated from assumed worths or from a pilot, and their answers tested as
-    `subdermal analyse` does. Nothing here is an answer of a person.
+    Participants are simulated from assumed worths or from a pilot, and their answers decided by the
+    study's declared analysis, as `subdermal analyse` does. Nothing here is an answer of a person.
     """
     from stimuli.study import load_study
 
@@ -182,8 +179,9 @@ def command(
 
     from tqdm import tqdm
 
+    from analysis import declared
     from analysis.codebook import Codebook
-    from analysis.power import DESIGNS, Answering, Plan, fit_pilot, plan_table, power_files
+    from analysis.planning import DESIGNS, Answering, Plan, fit_pilot, plan_table, power_files
     from analysis.report import write_files
     from analysis.responses import read_responses
 
@@ -217,16 +215,22 @@ def command(
         answering, **{name: value for name, value in given.items() if value is not None}
     )
     known = ("golubev", "golubev_plus")
+    options = declared.options(
+        definition.analysis,
+        f"{study}: [analysis]",
+        level=None if alpha is None else round(1 - alpha, 10),
+        margin=margin,
+    )
     plan = Plan(
         techniques=techniques,
         pair=pair or (known if set(known) <= set(techniques) else techniques[:2]),
         difference=definition.analysis.get("margin_jod", 0.5) if difference is None else difference,
         worths=table,
         answering=answering,
+        framings=cells,
         answers_each=answers,
-        alpha=round(1 - definition.analysis.get("level", 0.95), 10) if alpha is None else alpha,
+        options=options,
         power=wanted,
-        family=family or definition.questions,
         most=most,
         studies=studies,
         seed=seed,
@@ -237,10 +241,15 @@ def command(
         designs,
         lambda steps: tqdm(steps, desc="simulated studies", unit="design", disable=None),
     )
-    files, sentences = power_files(plan, curves, needed, codebook, source, _written(study))
+    fingerprint = declared.fingerprint(definition.analysis)
+    files, sentences = power_files(
+        plan, curves, needed, codebook, source, _written(study), fingerprint
+    )
     write_files(files, out)
     for sentence in sentences:
         click.echo(sentence)
+    if fingerprint:
+        click.echo(f"sha256 of the study's [analysis]: {fingerprint}")
     click.echo(f"{out / 'power.md'}: {studies} simulated studies for each design, seed {seed}")
 
 

@@ -88,10 +88,12 @@ def test_no_ties_at_all(report):
     assert found[found.model == "bradley_terry"].estimate.notna().all()
 
 
-def test_an_unbeaten_technique_is_named_and_has_no_number(report):
+def test_an_unbeaten_technique_is_named_and_its_fit_is_marked(report):
     files = report(8, ["a", "b", "c"], lambda rng, a, b: -2 if a == "a" else any_answer(rng, a, b))
-    assert "a was never beaten by b, c" in in_short(files)
-    assert worths(files).query("model == 'thurstone_jod'").estimate.isna().all()
+    text = in_short(files)
+    assert "a was never beaten by b, c or tied with them" in text and "reduced bias" in text
+    found = worths(files).query("model == 'thurstone_jod'")
+    assert found.estimate.notna().all() and set(found.fit) == {"reduced bias"}
 
 
 def test_groups_that_never_met_are_named(report):

@@ -23,10 +23,14 @@ COLUMNS = {
     "ahp_consistency": (
         "framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,judgement,consistent"
     ),
-    "worths": "framing,model,technique,estimate,low,high",
+    "worths": "framing,model,technique,estimate,low,high,fit",
     "worth_models": "framing,model,parameter,estimate,low,high",
+    "goodness": "framing,model,parameters,log_likelihood,deviance,df,p",
     "pairs": ",".join(PAIRS),
+    "contrasts": "framing,a,b,estimate,low,high,p,holm_p",
+    "omnibus": "framing,question,people,size,p",
     "trend": "statistic,value,low,high,p",
+    "order_effects": "statistic,people,value,low,high,p",
     "agreement": "framing,statistic,value,low,high,p",
     "side_balance": "framing,technique,left,right,left_share,p,holm_p",
     "participants": "participant,familiarity,answers,left,none,right,side_p,same_answer_share,"

@@ -55,7 +55,17 @@ TABLES = (
             "trend",
             "agreement",
         ),
-        *("notes", "participants", "side_balance", "sensitivity", "familiarity_interaction"),
+        *(
+            "notes",
+            "participants",
+            "side_balance",
+            "sensitivity",
+            "goodness",
+            "contrasts",
+            "omnibus",
+            "order_effects",
+            "familiarity_interaction",
+        ),
     }
     | {f"ahp_matrix_{name}" for name in ("close-up", "head-shot", "half-length")}
 )

@@ -3,7 +3,7 @@ change them; what has none.
 """
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import choix
 import numpy as np
@@ -19,11 +19,13 @@ from analysis.worth import (
     JOD_SIGMA,
     bradley_terry,
     davidson,
+    davidson_sides,
     missing_fit,
     ordinal,
     thurstone_jod,
     worths,
 )
+from analysis.worth.ordinal import Likelihood, Quadrature
 
 #: Wins of row over column: American League East 1987, in Agresti, "Categorical Data Analysis", 2nd
 #: ed. 2002, table 10.10.
@@ -199,7 +201,7 @@ def test_the_gradient_of_the_ordinal_likelihood_is_its_derivative(crowd):
     answered = np.where(
         np.random.default_rng(0).random(panel.preference.shape) < 0.2, MISSING, panel.preference
     ).astype(np.int8)
-    likelihood = worth._Likelihood(replace(panel, preference=answered), mixed=True)
+    likelihood = Likelihood(replace(panel, preference=answered), mixed=True)
     theta = np.random.default_rng(1).normal(0, 0.4, len(likelihood.start()))
     _, slope = likelihood(theta)
     step = 1e-5
@@ -215,7 +217,7 @@ def test_laplace_is_near_the_integral(crowd):
     points.
     """
     panel = crowd(15, [-0.5, 0, 0.7], seed=9, taste=0.7, leaning=0.4)
-    likelihood = worth._Likelihood(panel, mixed=True)
+    likelihood = Likelihood(panel, mixed=True)
     theta = np.array([0.4, -0.6, 0.1, np.log(0.6), np.log(1.4), 0.7, 0.4])
     node, weight = np.polynomial.hermite_e.hermegauss(30)
     grid = np.stack(np.meshgrid(node, node, node, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -237,7 +239,7 @@ def test_laplace_is_near_the_integral(crowd):
         )
     laplace = -likelihood(theta)[0] * likelihood.answers
     assert laplace == pytest.approx(total, rel=5e-3) and laplace != pytest.approx(total, rel=1e-5)
-    quadrature = worth._Quadrature(likelihood, theta)
+    quadrature = Quadrature(likelihood, theta)
     assert -quadrature(theta)[0] * likelihood.answers == pytest.approx(total, rel=1e-5)
     away, step = theta + 0.05, 1e-5
     numeric = [
@@ -323,7 +325,10 @@ def estimates(responses, options=None):
 
 def test_worths_have_their_columns_and_centre_on_0_within_a_framing(study, table):
     found = worths(table(study, replace(study, framing="head-shot")), Options(resamples=100))
-    assert list(found.columns) == ["framing", "model", "technique", "estimate", "low", "high"]
+    assert list(found.columns) == [
+        *("framing", "model", "technique", "estimate", "low", "high", "fit")
+    ]
+    assert set(found.fit) == {"maximum likelihood"}
     assert list(dict.fromkeys(found.model)) == list(MODELS)
     assert list(dict.fromkeys(found.framing)) == ["close-up", "head-shot", "overall"]
     assert found.groupby(["framing", "model"]).estimate.sum().abs().max() < 1e-8
@@ -368,9 +373,9 @@ def test_a_known_truth_is_in_its_interval_as_often_as_claimed(crowd, model):
         else:
             cuts = (0.6, 2.0) if model == "ordinal" else (0.0, 2.0)
             panel = crowd(30, truth * scale, seed=seed, noise=noise, cuts=cuts)
-        _estimate, low, high, said = worth._worth(panel, model, options)
-        assert not any("no finite" in note for note in said)
-        hits += ((low <= truth) & (truth <= high)).sum()
+        one = worth.fit(panel, model, options)
+        assert not any("no finite worths" in note for note in one.notes)
+        hits += ((one.low <= truth) & (truth <= one.high)).sum()
     assert 160 <= hits <= 180
 
 
@@ -386,44 +391,117 @@ def _davidson_people(crowd, truth, seed):
 # --- what has no worth
 # -----------------------------------------------------------------------------
 
-REFUSED = {
+UNBEATEN = {
     "a was never beaten by b, c": ["a>b a>c b>c"] * 3 + ["a>>b a>c b<c"] * 3,
     "c was never preferred to a, b": ["a>c b>c a>b"] * 3 + ["a>c b>c a<b"] * 3,
-    "a, b and c, d were never compared": ["a>b c>d"] * 3 + ["a<b c<d"] * 3,
-    "every answer is 'no difference'": ["a=b b=c a=c"] * 6,
     "a, b were never beaten by c, d": ["a>b a>c b>d c>d a>d b>c"] * 3
     + ["a<b a>c b>d c<d a>d b>c"] * 3,
 }
+REFUSED = {
+    "a, b and c, d were never compared": ["a>b c>d"] * 3 + ["a<b c<d"] * 3,
+    "every answer is 'no difference'": ["a=b b=c a=c"] * 6,
+}
 
 
-@pytest.mark.parametrize("reason", REFUSED)
+@pytest.mark.parametrize("reason", [*REFUSED, *UNBEATEN])
 def test_a_fit_that_does_not_exist_is_named_and_not_invented(lines, reason):
-    responses = lines(*REFUSED[reason])
-    found = worths(responses, Options(resamples=100))
+    responses = lines(*(REFUSED | UNBEATEN)[reason])
+    options = Options(resamples=100, fallback="none" if reason in UNBEATEN else "reduced_bias")
+    found = worths(responses, options)
     assert found[["estimate", "low", "high"]].isna().all(axis=None) and len(found) == 4 * len(
         responses.items["close-up"]
     )
     assert all(
         any(
-            f"close-up, {model}: no finite worths: {reason}" in note
+            f"close-up, {model}: no finite worths" in note and reason in note
             for note in found.attrs["notes"]
         )
         for model in MODELS
     )
-    assert worth.parameters(responses, Options(resamples=100)).empty
+    assert worth.parameters(responses, options).empty and set(found.fit) == {""}
 
 
-def test_tied_but_never_beaten_has_no_bradley_terry_but_may_have_a_davidson(lines):
+@pytest.mark.parametrize("reason", UNBEATEN)
+def test_an_unbeaten_technique_has_a_marked_fit_and_an_open_interval(lines, reason):
+    """No panel disappears; and resampling a technique that always won must not make it certain."""
+    responses = lines(*UNBEATEN[reason])
+    found = worths(responses, Options(resamples=100))
+    assert found[["estimate", "low", "high"]].notna().all(axis=None)
+    assert set(found.fit) == {"reduced bias", "weak prior"}
+    assert all(
+        any(
+            f"{model}: maximum likelihood has no finite worths" in note and reason in note
+            for note in found.attrs["notes"]
+        )
+        for model in MODELS
+    )
+    assert ((found.high - found.estimate) > 0.3).all() and (found.high < 12).all()
+    assert ((found.estimate - found.low) > 0.3).all() and (found.low > -12).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_reduced_bias_is_the_maximum_of_jeffreys_penalised_likelihood(seed):
+    """Firth 1993: for the logit link, and for Davidson's exponential family, against a general
+    optimiser; with a technique that never won, where maximum likelihood has none.
+    """
+    rng = np.random.default_rng(seed)
+    won = rng.integers(1, 6, (4, 4)) * (1 - np.eye(4, dtype=int))
+    won[0] = 0
+    level = np.triu(rng.integers(0, 4, (4, 4)), 1)
+    level[0] = 0
+    i, j = np.triu_indices(4, 1)
+    basis = np.linalg.svd(np.eye(4) - 1 / 4)[0][:, :3]
+    x = (np.eye(4)[i] - np.eye(4)[j]) @ basis
+    for ties in (np.zeros((4, 4)), level + level.T):
+        counts = np.stack([won[i, j], won[j, i], ties[i, j]], axis=1)
+        size = 4 if ties.any() else 3
+
+        def loss(theta, counts=counts, size=size):
+            d = x @ theta[:3]
+            tie = np.full_like(d, theta[3] if size == 4 else -np.inf)
+            p = special.softmax(np.stack([d / 2, -d / 2, tie], axis=1), axis=1)
+            information = np.zeros((size, size))
+            for k in range(6):
+                jacobian = np.zeros((2, size))
+                jacobian[0, :3], jacobian[1, 3:] = x[k], 1
+                features = np.array([[0.5, 0], [-0.5, 0], [0, 1]])
+                mean = p[k] @ features
+                spread = (features.T * p[k]) @ features - np.outer(mean, mean)
+                information += counts[k].sum() * jacobian.T @ spread @ jacobian
+            seen = counts > 0
+            fit = (counts[seen] * np.log(p[seen])).sum()
+            return -fit - 0.5 * np.linalg.slogdet(information)[1]
+
+        best = optimize.minimize(loss, np.zeros(size), options={"gtol": 1e-7}).x
+        found, log_nu = davidson(won, ties, reduced_bias=True)
+        assert found == pytest.approx(basis @ best[:3], abs=1e-4)
+        assert np.isnan(davidson(won, ties)[0]).all()
+        if size == 4:
+            assert log_nu == pytest.approx(best[3], abs=1e-4)
+
+
+def test_reduced_bias_of_one_pair_is_half_an_answer_for_each():
+    """One logit: Jeffreys' prior adds half a win on each side."""
+    found = bradley_terry([[0, 20], [0, 0]], reduced_bias=True)
+    assert found[0] - found[1] == pytest.approx(np.log(20.5 / 0.5))
+    assert np.diff(thurstone_jod([[0, 0], [20, 0]], reduced_bias=True)) > 2
+
+
+def test_a_tie_is_neither_a_defeat_nor_the_want_of_one(lines):
+    """One rule: a was tied and never beaten, which half wins give a number and dropped ones do
+    not.
+    """
     responses = lines(*["a=b b>c a>c"] * 4, *["a>b b<c a=c"] * 4, *["a=b b=c a=c"] * 4)
     (panel,) = panels(responses).values()
-    assert (
-        missing_fit(panel, "bradley_terry")
-        == missing_fit(panel, "thurstone_jod")
-        == "a was never beaten by b, c"
-    )
+    for model in ("bradley_terry", "thurstone_jod"):
+        assert missing_fit(panel, model) is None
+        assert missing_fit(panel, model, "drop") == "a was never beaten by b, c"
     assert missing_fit(panel, "davidson") is None and missing_fit(panel, "ordinal") is None
-    found = worths(responses, Options(resamples=100)).set_index(["model", "technique"]).estimate
-    assert np.isnan(found["bradley_terry", "a"]) and found["davidson", "a"] > found["davidson", "b"]
+    found = worths(responses, Options(resamples=100)).set_index(["model", "technique"])
+    assert found.estimate["davidson", "a"] > found.estimate["davidson", "b"]
+    assert found.fit["bradley_terry", "a"] == "maximum likelihood"
+    dropped = worths(responses, Options(resamples=100, ties="drop"))
+    assert set(dropped[dropped.model == "bradley_terry"].fit) == {"reduced bias"}
 
 
 def test_separated_answers_are_refused(lines):
@@ -447,9 +525,8 @@ def test_tastes_that_grow_without_end_are_refused(crowd, table):
         )
         if ordinal(other) is None and missing_fit(other, "ordinal") is None
     )
-    assert (
-        found.estimate.isna().all() and "can grow together without end" in found.attrs["notes"][0]
-    )
+    assert "can grow together without end" in found.attrs["notes"][0]
+    assert set(found.fit) == {"weak prior"} and found.estimate.notna().all()
 
 
 def test_two_techniques_have_the_log_odds(lines):
@@ -471,15 +548,64 @@ def test_few_people_get_no_interval_and_one_no_ordinal_model(lines):
     assert any("needs 5" in note for note in found.attrs["notes"])
 
 
-def test_resamples_without_a_fit_are_counted(lines):
+def test_intervals_survive_resamples_without_a_fit(lines):
     """a is beaten by one person in six: a third of the resamples leave that one out."""
     responses = lines(*["a>b b>c a>c"] * 2, *["a>b b<c a>c"] * 3, "a<b b<c a<c")
     found = worths(responses, Options(resamples=200, models=("bradley_terry",)))
-    assert found.estimate.notna().all() and found[["low", "high"]].isna().all(axis=None)
+    assert found[["estimate", "low", "high"]].notna().all(axis=None)
+    assert (found.low > -6).all() and (found.high < 6).all()
+    assert set(found.fit) == {"maximum likelihood"}
     assert any(
-        "resamples have no finite worths; too many for an interval" in note
+        "resamples have no finite maximum: the interval is that of worths with reduced bias" in note
         for note in found.attrs["notes"]
     )
+    refused = worths(responses, Options(resamples=200, models=("bradley_terry",), fallback="none"))
+    assert refused[["low", "high"]].isna().all(axis=None)
+
+
+def test_davidson_with_a_side_finds_it():
+    """Counts drawn from the model of Davidson and Beaver 1977; without a side it is Davidson's."""
+    rng = np.random.default_rng(2)
+    truth, log_nu, side = np.array([-0.6, 0.1, 0.5]), -0.3, 0.4
+    counts = np.zeros((3, 3, 3))
+    for i, j in permutations(range(3), 2):
+        d = truth[i] - truth[j] + side
+        p = special.softmax([d / 2, -d / 2, log_nu])
+        counts[i, j] = rng.multinomial(4000, p)
+    found, found_nu, found_side = davidson_sides(counts)
+    assert found == pytest.approx(truth, abs=0.05)
+    assert found_nu == pytest.approx(log_nu, abs=0.05)
+    assert found_side == pytest.approx(side, abs=0.05)
+    both = counts + np.swapaxes(counts, 0, 1)[..., [1, 0, 2]]
+    plain, nu = davidson(both[..., 0], both[..., 2])
+    even, even_nu, none = davidson_sides(both)
+    assert even == pytest.approx(plain, abs=1e-5) and none == pytest.approx(0, abs=1e-5)
+    assert even_nu == pytest.approx(nu, abs=1e-5)
+
+
+def test_standard_errors_are_statsmodels():
+    i, j = np.triu_indices(7, 1)
+    x = (np.eye(7)[i] - np.eye(7)[j])[:, :-1]
+    fit = sm.GLM(
+        np.column_stack([BASEBALL[i, j], BASEBALL[j, i]]), x, family=sm.families.Binomial()
+    ).fit(tol=1e-12)
+    covariance = np.zeros((7, 7))
+    covariance[:6, :6] = fit.cov_params()
+    centring = np.eye(7) - 1 / 7
+    expected = np.sqrt(np.diag(centring @ covariance @ centring))
+    assert worth.standard_errors(BASEBALL) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_deviance_is_that_of_the_regression(crowd, table):
+    panel = crowd(40, [-0.5, 0, 0.3, 0.6], seed=2, cuts=(0.0, 2.0))
+    found = worth.goodness(table(panel, order="abcd"), Options()).set_index("model")
+    i, j = np.triu_indices(4, 1)
+    won = wins(panel, panel.counts)
+    x = (np.eye(4)[i] - np.eye(4)[j])[:, :-1]
+    fit = sm.GLM(np.column_stack([won[i, j], won[j, i]]), x, family=sm.families.Binomial()).fit()
+    assert found.deviance["bradley_terry"] == pytest.approx(fit.deviance)
+    assert found.df["bradley_terry"] == 3
+    assert found.p["bradley_terry"] == pytest.approx(stats.chi2.sf(fit.deviance, 3))
 
 
 def test_eleven_techniques(crowd, table):

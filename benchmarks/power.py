@@ -1,0 +1,132 @@
+"""Power and analyse agree: tables of simulated answers go through the whole of `analyse`, and its
+report concludes as often as `power` says.
+
+For the thesis's design (five techniques, three framings, 30 pairs) and what its study declares: as
+many people as `power` names to find 0.5 JOD and to exclude 0.25 points, each table read from a file
+of its own, every table of the analysis made, and the verdict and the sentence of the report taken.
+It ends with an error where the share of studies that conclude is more than 4 standard errors of
+both simulations from the power that was promised, or a sentence disagrees with its verdict.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from analysis import read_responses
+from analysis.compute import everything
+from analysis.conclusions import conclude
+from analysis.inference import verdict
+from analysis.options import Options
+from analysis.planning import Plan, Studies, plan_table
+
+TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
+PAIR = ("golubev", "golubev_plus")
+FRAMINGS = ("close-up", "head-shot", "half-length")
+HEADER = "participant,familiarity,framing,left,right,answer,order,rt_ms,started_at,simulated"
+
+
+def write_table(path: Path, run: Studies, study: int, people: int, seed: int) -> None:
+    """responses.csv of the first people of one simulated study, sides and order shuffled."""
+    rng, plan = np.random.default_rng([seed, study]), run.plan
+    lines = [HEADER]
+    for person in range(people):
+        asked = np.argwhere(run.asked[study, person])
+        for order, (framing, pair) in enumerate(rng.permutation(asked), start=1):
+            a, b = plan.pairs[pair]
+            answer, turn = int(run.answers[study, person, framing, pair]), rng.random() < 0.5
+            left, right = (b, a) if turn else (a, b)
+            lines.append(
+                f"P{person:04d},{1 + person % 5},{plan.framings[framing]},"
+                f"{plan.techniques[left]},{plan.techniques[right]},{-answer if turn else answer},"
+                f"{order},{int(rng.lognormal(8.5, 0.5))},2024-05-01T09:00:00Z,1"
+            )
+    path.write_text("\n".join(lines) + "\n")
+
+
+def concluded(path: Path, options: Options, goal: str) -> tuple[list[bool], bool]:
+    """Whether the report concludes it for the pair at each framing, and whether its sentences say
+    so.
+    """
+    responses = read_responses(path, order=TECHNIQUES)
+    results = everything(responses, options)
+    words = conclude(
+        results.tables, results.notes, responses.codebook, options, responses.participants, True
+    )
+    pairs = results.tables["pairs"]
+    about = pairs[(pairs.a == PAIR[0]) & (pairs.b == PAIR[1]) & (pairs.framing != "overall")]
+    wanted = {"find": ("different", "both"), "exclude": ("equivalent", "both")}[goal]
+    reached = [verdict(row, 0.05) in wanted for row in about.itertuples()]
+    if goal == "find":
+        said = [
+            any(
+                f"{name}: simulated participants preferred" in one and PAIR[1] in one.split(" (")[0]
+                for one in words.can
+            )
+            for name in about.framing
+        ]
+        return reached, all(there for here, there in zip(reached, said, strict=True) if here)
+    said = [
+        any(one.startswith(f"{name}: {PAIR[0]} and {PAIR[1]} are as good") for one in words.can)
+        for name in about.framing
+    ]
+    return reached, reached == said
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--studies", type=int, default=40, help="tables through analyse, each goal")
+    parser.add_argument("--seed", type=int, default=7)
+    given = parser.parse_args()
+    options = Options(margin=0.25, margin_jod=0.5)
+    plan = Plan(TECHNIQUES, PAIR, framings=FRAMINGS, options=options, studies=1000, seed=1)
+    begun = time.process_time()
+    _, needed = plan_table(plan, ("full",))
+    print(f"power: 1,000 simulated studies in {time.process_time() - begun:.1f} s of CPU")
+    declared = needed[(needed.test == "declared") & (needed.correction == "family")]
+    failed = []
+    for goal, difference in (("find", 0.5), ("exclude", 0.0)):
+        row = declared[declared.goal == goal].iloc[0]
+        people = int(row.people)
+        fresh = Plan(
+            TECHNIQUES,
+            PAIR,
+            framings=FRAMINGS,
+            options=options,
+            studies=max(50, given.studies),
+            most=people,
+        )
+        run = Studies(fresh, "full", difference, np.random.default_rng(given.seed))
+        begun, reached, agreed = time.process_time(), [], True
+        with tempfile.TemporaryDirectory(prefix="subdermal-") as folder:
+            for study in range(given.studies):
+                path = Path(folder) / "responses.csv"
+                write_table(path, run, study, people, given.seed)
+                one, same = concluded(path, options, goal)
+                reached.append(np.mean(one))
+                agreed &= same
+        share = float(np.mean(reached))
+        error = math.hypot(
+            np.std(reached, ddof=1) / math.sqrt(given.studies), 0.4 / math.sqrt(1000)
+        )
+        print(
+            f"{goal}: {people} people promised {row.power:.3f}; through analyse {share:.3f} of "
+            f"{given.studies} studies at three framings (+-{error:.3f}), "
+            f"{time.process_time() - begun:.0f} s of CPU; sentences "
+            f"{'agree' if agreed else 'DISAGREE'} with verdicts"
+        )
+        if abs(share - row.power) > 4 * error or not agreed:
+            failed.append(goal)
+    for goal in failed:
+        print(f"missed: {goal}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
