@@ -1,7 +1,7 @@
 """The whole report, from a table on disk to all files: CPU time against people. The aim: under a
 minute for 1,000 people x 30 answers.
 
-The answers are simulated by the model of analysis.power, five techniques at three framings. Each
+The answers are simulated by the model of analysis.planning, five techniques at three framings. Each
 size runs in a process of its own, so that imports and the peak of memory count.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.power import SIGMA
+from analysis.planning import SIGMA
 
 FRAMINGS = {
     "close-up": (-1.2, -0.5, 0.5, 1.0, 0.2),

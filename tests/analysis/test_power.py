@@ -15,7 +15,7 @@ from analysis import InputError, read_responses, responses_from_records
 from analysis.inference import pairs, verdict
 from analysis.inference.people import sign_counts, signed_rank_counts
 from analysis.options import Options
-from analysis.power import (
+from analysis.planning import (
     SIGMA,
     Answering,
     Plan,
@@ -297,8 +297,8 @@ def test_the_same_seed_gives_the_same_numbers_and_another_one_others():
 
 
 def test_a_pilot_gives_back_what_it_was_drawn_from(write):
-    """A known truth, drawn by `analysis.power`'s own model with 400 people: worths within 0.25 JOD,
-    cuts within 0.15 JOD.
+    """A known truth, drawn by `analysis.planning`'s own model with 400 people: worths within
+    0.25 JOD, cuts within 0.15 JOD.
     """
     worths = {"close-up": dict(zip(THESIS, (-1.0, -0.4, 0.4, 0.8, 0.2), strict=True))}
     truth = plan(
