@@ -18,49 +18,52 @@ The public face (numpy, pandas and scipy, no matplotlib):
 
 `responses_from_records` takes mappings instead of a file. Errors of the user's making are
 `InputError`. Figures and the report live in `analysis.figures` and `analysis.report`, which load
-matplotlib.
+matplotlib. Names resolve on first use, so that `analysis.manifest`, `analysis.options` and
+`analysis.declared`, which the study's own checks go by, load no scipy.
 """
 
-from analysis.ahp import (
-    Comparison,
-    Priorities,
-    comparisons,
-    medians,
-    priorities,
-    priorities_table,
-    read_matrices,
-)
-from analysis.codebook import Codebook, read_manifest
-from analysis.compute import Results, everything
-from analysis.errors import InputError
-from analysis.options import Exclusions, Options
-from analysis.responses import Finding, Responses, read_responses, responses_from_records
-from analysis.tallies import distributions, familiarity, preferences, scores, sides, totals, trend
+from __future__ import annotations
 
-__all__ = [
-    "Codebook",
-    "Comparison",
-    "Exclusions",
-    "Finding",
-    "InputError",
-    "Options",
-    "Priorities",
-    "Responses",
-    "Results",
-    "comparisons",
-    "distributions",
-    "everything",
-    "familiarity",
-    "medians",
-    "preferences",
-    "priorities",
-    "priorities_table",
-    "read_manifest",
-    "read_matrices",
-    "read_responses",
-    "responses_from_records",
-    "scores",
-    "sides",
-    "totals",
-    "trend",
-]
+import importlib
+
+_WHERE = {
+    name: module
+    for module, names in {
+        "analysis.ahp": (
+            "Comparison",
+            "Priorities",
+            "comparisons",
+            "medians",
+            "priorities",
+            "priorities_table",
+            "read_matrices",
+        ),
+        "analysis.codebook": ("Codebook", "read_manifest"),
+        "analysis.compute": ("Results", "everything"),
+        "analysis.errors": ("InputError",),
+        "analysis.options": ("Exclusions", "Options"),
+        "analysis.responses": (
+            "Finding",
+            "Responses",
+            "read_responses",
+            "responses_from_records",
+        ),
+        "analysis.tallies": (
+            "distributions",
+            "familiarity",
+            "preferences",
+            "scores",
+            "sides",
+            "totals",
+            "trend",
+        ),
+    }.items()
+    for name in names
+}
+__all__ = sorted(_WHERE)
+
+
+def __getattr__(name: str):
+    if name not in _WHERE:
+        raise AttributeError(f"module 'analysis' has no attribute {name!r}")
+    return getattr(importlib.import_module(_WHERE[name]), name)

@@ -6,21 +6,18 @@ A codebook comes from a study's `manifest.json`, or, without one, from the table
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from analysis.errors import InputError
+from analysis.manifest import FAMILIARITY, ManifestFile, open_manifest, read_self_rating
 
-MANIFEST_FORMATS = ("subdermal-manifest/1", "subdermal-manifest/2")
 #: The factor that answers are grouped by when none is chosen.
 FRAMING = "framing"
 #: From near to far. A randomised questionnaire shows them in any order, so that first appearance
 #: says nothing.
 KNOWN_FRAMINGS = ("close-up", "head-shot", "half-length")
-#: Labels of the levels 1 to 5 of the self-rating, where the study names none.
-FAMILIARITY = ("1, no familiarity", "2", "3", "4", "5, high familiarity")
 
 
 @dataclass(frozen=True)
@@ -138,109 +135,56 @@ def from_table(
     )
 
 
-def is_manifest(path: Path) -> bool:
-    """Whether the file is a subdermal manifest of any version, whole or not; other tools write a
-    `manifest.json` too.
-    """
-    return b'"subdermal-manifest/' in path.read_bytes()
-
-
-def read_manifest(path: str | Path) -> Codebook:
+def read_manifest(path: str | Path | ManifestFile) -> Codebook:
     """The codebook of a study, from its `manifest.json` (or the folder that holds it).
 
     Images are not looked at.
     """
-    path = Path(path)
-    if path.is_dir():
-        path = path / "manifest.json"
-    try:
-        manifest = json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json"
-        ) from None
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON: {' '.join(str(error).split())}") from None
-    if not isinstance(manifest, dict) or manifest.get("format") not in MANIFEST_FORMATS:
-        got = manifest.get("format") if isinstance(manifest, dict) else type(manifest).__name__
-        raise InputError(f"{path}: format is {got!r}, expected {MANIFEST_FORMATS[-1]!r}")
-    study = manifest.get("study")
-    if not isinstance(study, dict):
-        raise InputError(
-            f"{path}: study is {study!r:.60}, expected a table with framings and techniques"
-        )
-    framings, techniques = (_named(path, study, key) for key in ("framings", "techniques"))
-    labels, ratings = _self_rating(path, study)
+    manifest = path if isinstance(path, ManifestFile) else open_manifest(path)
+    return of_study(
+        manifest.study, f"{manifest.path}: study", f"the study's ({manifest.path.name})"
+    )
+
+
+def of_study(study: Mapping, where: str = "study", rule: str = "the study's") -> Codebook:
+    """The codebook of a study's record, as `study` in a manifest.
+
+    where: what errors call it; rule: where the orders of framings and techniques come from.
+    """
+    framings, techniques = (
+        _named(f"{where}.{key}", study.get(key)) for key in ("framings", "techniques")
+    )
+    labels, ratings = read_self_rating(f"{where}.familiarity", study.get("familiarity") or {})
+    factors = {}
+    entries = study.get("factors") or []
+    for place, (name, entry) in enumerate(zip(_named(f"{where}.factors", entries, 0), entries)):
+        factors[name] = _named(f"{where}.factors[{place}].levels", entry.get("levels"))
     return Codebook(
         framings=tuple(framings),
         techniques=tuple(techniques),
-        order_rule=f"the study's ({path.name})",
-        framing_rule=f"the study's ({path.name})",
-        labels={("framing", name): label for name, label in framings.items()}
-        | {("technique", name): label for name, label in techniques.items()}
-        | _further(study),
-        factors=tuple(factor["name"] for factor in study.get("factors") or []),
+        order_rule=rule,
+        framing_rule=rule,
+        labels={
+            (kind, name): label
+            for kind, named in {FRAMING: framings, "technique": techniques, **factors}.items()
+            for name, label in named.items()
+        },
+        factors=tuple(factors),
         familiarity=labels,
         ratings=ratings,
         title=str(study.get("title") or study.get("name") or ""),
     )
 
 
-def _self_rating(path: Path, study: dict) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """Labels and levels of the study's self-rating: `familiarity.labels`, from 2 on, and
-    `familiarity.levels`, whole numbers that ascend; without levels they count from 1.
-    """
-    rating = study.get("familiarity")
-    rating = rating if isinstance(rating, dict) else {}
-    labels, levels = rating.get("labels"), rating.get("levels")
-    if labels is None and levels is None:
-        return FAMILIARITY, tuple(range(1, len(FAMILIARITY) + 1))
-    if labels is not None and not (
-        isinstance(labels, list)
-        and len(labels) >= 2
-        and all(isinstance(text, str) for text in labels)
-    ):
-        raise InputError(
-            f"{path}: study.familiarity.labels is {labels!r:.60}, expected texts, two or more"
-        )
-    levels = list(range(1, len(labels) + 1)) if levels is None else levels
-    labels = list(map(str, levels)) if labels is None else labels
-    if not (
-        isinstance(levels, list)
-        and all(isinstance(one, int) and not isinstance(one, bool) for one in levels)
-        and levels == sorted(set(levels))
-        and len(levels) == len(labels)
-    ):
-        raise InputError(
-            f"{path}: study.familiarity.levels is {levels!r:.60}, expected whole numbers that "
-            "ascend, one for each label"
-        )
-    return tuple(labels), tuple(levels)
-
-
-def _further(study: dict) -> dict[tuple[str, str], str]:
-    """(factor, level) -> label of the factors beside framing."""
-    found = {}
-    for factor in study.get("factors") or []:
-        for level in factor.get("levels", []):
-            found[factor["name"], level["name"]] = level.get("label", level["name"])
-    return found
-
-
-def _named(path: Path, study: dict, key: str) -> dict[str, str]:
-    """Name -> label of study.framings or study.techniques, checked."""
-    entries = study.get(key)
-    if not isinstance(entries, list) or not entries:
-        raise InputError(
-            f"{path}: study.{key} is {entries!r:.60}, expected a list of tables with a name"
-        )
+def _named(where: str, entries: object, least: int = 1) -> dict[str, str]:
+    """Name -> label of a list of tables, checked; a name is its own label where none is given."""
+    if not isinstance(entries, list) or len(entries) < least:
+        raise InputError(f"{where} is {entries!r:.60}, expected a list of tables with a name")
     labels: dict[str, str] = {}
     for place, entry in enumerate(entries):
         name = entry.get("name") if isinstance(entry, dict) else None
         if not isinstance(name, str) or not name or name in labels:
-            raise InputError(
-                f"{path}: study.{key}[{place}].name is {name!r:.60}, expected a name of its own"
-            )
+            raise InputError(f"{where}[{place}].name is {name!r:.60}, expected a name of its own")
         label = entry.get("label")
         labels[name] = label if isinstance(label, str) and label else name
     return labels

@@ -13,8 +13,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import fields
-from pathlib import Path
+from dataclasses import fields, replace
+from difflib import get_close_matches
 
 from analysis.errors import InputError
 from analysis.options import Exclusions, Options
@@ -22,68 +22,57 @@ from analysis.options import Exclusions, Options
 #: Where margins and rules come from, when no study file declares any.
 UNDECLARED = "no margin or rule was declared in a study file: the defaults of subdermal"
 
-
-def read_declared(path: str | Path) -> dict:
-    """`study.analysis` of a manifest.json (or of the folder that holds it); empty where it declares
-    nothing.
-    """
-    path = Path(path)
-    path = path / "manifest.json" if path.is_dir() else path
-    try:
-        declared = json.loads(path.read_bytes())["study"].get("analysis", {})
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json"
-        ) from None
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise InputError(f"{path}: has no study, expected a study's manifest.json") from None
-    if not isinstance(declared, dict):
-        raise InputError(f"{path}: study.analysis is {declared!r:.60}, expected a table")
-    return declared
+#: Choices that are numbers; a rule is a number or false.
+NUMBERS = ("margin", "margin_jod", "level")
 
 
 def options(
     declared: Mapping[str, object], source: str = "study.analysis", **given: object
 ) -> Options:
-    """Options from what a study declared, with what is `given` (None: not given) in its place."""
-    values = {**declared, **{name: value for name, value in given.items() if value is not None}}
-    rules = values.pop("exclusions", {})
+    """Options from what a study declared, with what is `given` (None: not given) in its place.
+
+    Raises InputError that names the key of `source` at fault, or the one that was given. This is
+    the one check of `[analysis]`: studies, manifests and the command line all come here.
+    """
+    rules = declared.get("exclusions", {})
     if not isinstance(rules, Mapping):
         raise InputError(f"{source}.exclusions is {rules!r:.60}, expected a table")
-    names = [
-        name
-        for name in declared
-        if name != "exclusions" and given.get(name) in (None, declared[name])
-    ]
-    named = (*names, *(f"exclusions.{name}" for name in rules))
-    for name, table, known in (
-        (source, values, Options),
-        (f"{source}.exclusions", rules, Exclusions),
-    ):
-        names = [
-            field.name for field in fields(known) if field.name not in ("exclusions", "declared")
-        ]
-        unknown = [key for key in table if key not in names]
-        if unknown:
-            raise InputError(
-                f"{name} names the unknown {', '.join(map(str, unknown))}; expected some of "
-                f"{', '.join(names)}"
-            )
-    for key, value in [
-        *rules.items(),
-        *(
-            (key, value)
-            for key, value in values.items()
-            if key in ("margin", "margin_jod", "level")
-        ),
-    ]:
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number and not (value is False and key in rules):
-            raise InputError(f"{source}: {key} is {value!r:.60}, expected a number")
-    if isinstance(values.get("models"), list):
-        values["models"] = tuple(values["models"])
-    rules = {key: None if value is False else value for key, value in rules.items()}
-    return Options(**values, exclusions=Exclusions(**rules), declared=named)
+    values = {key: value for key, value in declared.items() if key != "exclusions"}
+    _known(source, values, Options)
+    _known(f"{source}.exclusions", rules, Exclusions)
+    for key, value in {
+        **values,
+        **{f"exclusions.{key}": rule for key, rule in rules.items()},
+    }.items():
+        rule = key.startswith("exclusions.")
+        if (rule or key in NUMBERS) and not (_is_number(value) or (rule and value is False)):
+            expected = "a number or false" if rule else "a number"
+            raise InputError(f"{source}.{key} is {value!r:.60}, expected {expected}")
+    try:
+        found = Options(
+            **{key: tuple(v) if isinstance(v, list) else v for key, v in values.items()},
+            exclusions=Exclusions(**{k: None if v is False else v for k, v in rules.items()}),
+        )
+    except InputError as error:
+        raise InputError(f"{source}.{error}") from None
+    chosen = {name: value for name, value in given.items() if value is not None}
+    kept = [name for name in values if chosen.get(name, values[name]) == values[name]]
+    named = (*kept, *(f"exclusions.{name}" for name in rules))
+    return replace(found, **chosen, declared=named)
+
+
+def _known(source: str, table: Mapping[str, object], choices: type) -> None:
+    """Refuse a key that `choices` does not have."""
+    names = [one.name for one in fields(choices) if one.name not in ("exclusions", "declared")]
+    for key in table:
+        if key not in names:
+            near = get_close_matches(str(key), names, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names)}"
+            raise InputError(f"{source} names the unknown {key}; {hint}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def fingerprint(declared: Mapping[str, object]) -> str:

@@ -8,7 +8,7 @@ manifest is said and never made up: a technique's parameters are no measurement.
 
 from __future__ import annotations
 
-import json
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,18 +16,13 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.codebook import Codebook
+from analysis.codebook import FRAMING, Codebook
 from analysis.conclusions import listed
 from analysis.errors import InputError
+from analysis.manifest import MEASURES, ManifestFile, open_manifest
 
-#: Measure -> what it is called, with its unit. Less of each is better or cheaper.
-MEASURES = {
-    "samples_per_pixel": "samples a scattering pixel",
-    "milliseconds": "milliseconds an image",
-    "dssim": "DSSIM to the reference",
-    "flip": "FLIP to the reference",
-}
 REFERENCE = "reference"
+COLUMNS = ["framing", "technique", "measure", "value", "source"]
 
 
 @dataclass(frozen=True)
@@ -38,118 +33,135 @@ class Measured:
     notes: tuple[str, ...]
 
 
-def read_measures(path: str | Path, reference: str = REFERENCE) -> Measured:
+@dataclass(frozen=True)
+class _Image:
+    """What is read of an image: `cell`, the levels of all factors that it has; `level`, that of the
+    factor which answers are grouped by.
+    """
+
+    cell: tuple
+    level: str
+    technique: str
+    file: Path
+    region: tuple[float, float, float, float]
+    measures: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        return f"{self.technique} at {', '.join(map(str, self.cell))}"
+
+
+def read_measures(
+    path: str | Path | ManifestFile, reference: str = REFERENCE, factor: str = FRAMING
+) -> Measured:
     """The measures of a manifest.json (or of the folder that holds it), distances to the condition
     `reference` among them.
+
+    factor: what answers are grouped by; the column `framing` holds its levels. A technique's value
+    at a level is the mean over the images that it has there; an image is compared to the reference
+    of its own cell, over the region of interest where it has one.
     """
-    path = Path(path)
-    path = path / "manifest.json" if path.is_dir() else path
-    try:
-        images = json.loads(path.read_bytes()).get("images")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; expected a study's manifest.json"
-        ) from None
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON: {' '.join(str(error).split())}") from None
-    rows, notes = [], []
-    images = [one for one in images or [] if isinstance(one, dict)]
-    for place, image in enumerate(images):
-        measures = image.get("measures") or {}
-        if not isinstance(measures, dict):
-            raise InputError(
-                f"{path}: images[{place}].measures is {measures!r:.60}, expected a table of numbers"
-            )
-        for name, value in measures.items():
-            if name not in MEASURES:
-                raise InputError(
-                    f"{path}: images[{place}].measures names {name!r}, expected one of "
-                    f"{', '.join(MEASURES)}"
-                )
-            if (
-                isinstance(value, bool)
-                or not isinstance(value, int | float)
-                or not 0 <= value < float("inf")
-            ):
-                raise InputError(
-                    f"{path}: images[{place}].measures.{name} is {value!r:.60}, expected a "
-                    "number from 0"
-                )
-            rows.append(
-                (image.get("framing"), image.get("technique"), name, float(value), "manifest")
-            )
-    held = sorted({name for _, _, name, _, _ in rows})
+    manifest = path if isinstance(path, ManifestFile) else open_manifest(path)
+    images = _images(manifest, factor)
+    if not images:
+        spoken = factor.replace("_", " ")
+        why = f"Images have no {spoken}: cost and fidelity are not set beside worths by it."
+        return Measured(pd.DataFrame(columns=COLUMNS), (why,))
+    rows, notes = defaultdict(list), []
+    for image in images:
+        for name, value in image.measures.items():
+            rows[image.level, image.technique, name, "manifest"].append(float(value))
+    held = sorted({name for _, _, name, _ in rows})
     if wanted := [name for name in DISTANCES if name not in held]:
-        found, why = _to_reference(path.parent, images, reference, wanted)
-        rows += found
-        notes += why
+        distances, notes = _to_reference(images, reference, wanted)
+        rows |= distances
     for name in held:
-        missing = len(images) - sum(row[2] == name for row in rows)
+        missing = sum(name not in image.measures for image in images)
         if missing:
             notes.append(
                 f"{missing} of {len(images)} images in the manifest have no {MEASURES[name]}."
             )
-    absent = [
-        MEASURES[name]
-        for name in MEASURES
-        if name not in {row[2] for row in rows} and name not in DISTANCES
-    ]
+    absent = [MEASURES[name] for name in MEASURES if name not in held and name not in DISTANCES]
     if absent:
         notes.append(f"The manifest holds no {' and no '.join(absent)}; nothing is said of that.")
-    return Measured(
-        pd.DataFrame(rows, columns=["framing", "technique", "measure", "value", "source"]),
-        tuple(notes),
-    )
+    table = [(*key[:3], float(np.mean(values)), key[3]) for key, values in rows.items()]
+    return Measured(pd.DataFrame(table, columns=COLUMNS), tuple(notes))
+
+
+def _images(manifest: ManifestFile, factor: str) -> list[_Image]:
+    """The images that have a level of the factor."""
+    images = []
+    for place, entry in enumerate(manifest.images):
+        where = f"{manifest.path}: images[{place}]"
+        further = entry.get("levels") or {}
+        if not isinstance(further, dict):
+            raise InputError(f"{where}.levels is {further!r:.60}, expected a table of levels")
+        levels = {FRAMING: entry.get("framing"), **further}
+        if factor in levels:
+            images.append(
+                _Image(
+                    cell=tuple(levels[name] for name in sorted(levels, key=_framing_first)),
+                    level=levels[factor],
+                    technique=entry.get("technique"),
+                    file=manifest.path.parent / str(entry.get("file")),
+                    region=manifest.region(place),
+                    measures=manifest.measures(place),
+                )
+            )
+    return images
+
+
+def _framing_first(name: str) -> tuple[bool, str]:
+    return name != FRAMING, name
 
 
 def _to_reference(
-    folder: Path, images: list[dict], reference: str, wanted: list[str]
-) -> tuple[list[tuple], list[str]]:
-    """The `wanted` distances of every image to the reference of its framing."""
-    references = {
-        image.get("framing"): image for image in images if image.get("technique") == reference
-    }
+    images: list[_Image], reference: str, wanted: list[str]
+) -> tuple[dict[tuple, list[float]], list[str]]:
+    """The `wanted` distances of every image to the reference of its cell:
+    (level, technique, measure, "images") -> values, one a cell.
+    """
+    references = {image.cell: image for image in images if image.technique == reference}
     if not references:
-        return [], [
+        return {}, [
             f"No condition is called {reference!r}, so that no image is compared to a reference."
         ]
-    if not all((folder / str(image.get("file"))).is_file() for image in images):
-        return [], [
+    if not all(image.file.is_file() for image in images):
+        return {}, [
             "The images are not beside the manifest, so that none is compared to the reference."
         ]
+    rows, notes = defaultdict(list), []
+    for cell, chosen in references.items():
+        against = _pixels(chosen)
+        for image in images:
+            if image.cell != cell or image.technique == reference:
+                continue
+            other = _pixels(image)
+            if other.shape != against.shape:
+                notes.append(
+                    f"{image.name} differs in size from the reference and is not compared."
+                )
+                continue
+            for name in wanted:
+                distance = DISTANCES[name](against, other)
+                rows[image.level, image.technique, name, "images"].append(distance)
+    return rows, notes
+
+
+def _pixels(image: _Image) -> np.ndarray:
+    """The image's region of interest, (H, W, 3) in [0, 1], sRGB."""
     from PIL import Image
 
-    def pixels(image: dict) -> np.ndarray:
-        file = image.get("file")
-        try:
-            with Image.open(folder / str(file)) as picture:
-                return np.asarray(picture.convert("RGB"), np.float32) / 255
-        except OSError as error:
-            raise InputError(f"{folder / str(file)}: cannot be read as an image: {error}") from None
-
-    rows, notes = [], []
-    for framing, chosen in references.items():
-        against = pixels(chosen)
-        for image in images:
-            if image.get("framing") == framing and image.get("technique") != reference:
-                other = pixels(image)
-                if other.shape != against.shape:
-                    notes.append(
-                        f"{image.get('technique')} at {framing} differs in size from the "
-                        "reference and is not compared."
-                    )
-                    continue
-                rows += [
-                    (
-                        framing,
-                        image.get("technique"),
-                        name,
-                        DISTANCES[name](against, other),
-                        "images",
-                    )
-                    for name in wanted
-                ]
-    return rows, notes
+    try:
+        with Image.open(image.file) as picture:
+            pixels = np.asarray(picture.convert("RGB"), np.float32) / 255
+    except OSError as error:
+        raise InputError(f"{image.file}: cannot be read as an image: {error}") from None
+    height, width = pixels.shape[:2]
+    left, top, right, bottom = image.region
+    rows = slice(round(top * height), max(round(bottom * height), round(top * height) + 1))
+    columns = slice(round(left * width), max(round(right * width), round(left * width) + 1))
+    return pixels[rows, columns]
 
 
 def dssim(x: np.ndarray, y: np.ndarray) -> float:

@@ -47,7 +47,7 @@ class Exclusions:
 class Options:
     """The analyst's choices; each is recorded in the output.
 
-    resamples   participants are resampled this often, from 100
+    resamples   participants are resampled this often, from 100 to 1,000,000
     seed        of every random number in the analysis, from 0
     level       of the intervals, between 0.5 and 1
     margin      two techniques are as good as each other where the mean preference is within
@@ -80,10 +80,10 @@ class Options:
     declared: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, least in (("resamples", 100), ("seed", 0)):
+        for name, least, most in (("resamples", 100, 1_000_000), ("seed", 0, 2**63 - 1)):
             value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or value < least:
-                raise InputError(f"{name} is {value!r}, expected an integer from {least}")
+            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+                raise InputError(f"{name} is {value!r}, expected an integer from {least} to {most}")
         if not 0.5 < self.level < 1:
             raise InputError(
                 f"level is {self.level!r}, expected a number between 0.5 and 1, such as 0.95"
@@ -102,15 +102,16 @@ class Options:
                 raise InputError(
                     f"{name} is {getattr(self, name)!r}, expected one of {', '.join(known)}"
                 )
-        unknown = [
-            name
-            for name in self.models
-            if name not in Options.__dataclass_fields__["models"].default
-        ]
-        if unknown:
-            known = ", ".join(Options.__dataclass_fields__["models"].default)
+        models = Options.__dataclass_fields__["models"].default
+        if not isinstance(self.models, tuple):
             raise InputError(
-                f"models names the unknown {', '.join(unknown)}; expected some of {known}"
+                f"models is {self.models!r:.60}, expected a list of {', '.join(models)}"
+            )
+        unknown = [str(name) for name in self.models if name not in models]
+        if unknown:
+            raise InputError(
+                f"models names the unknown {', '.join(unknown)}; expected some of "
+                f"{', '.join(models)}"
             )
 
 

@@ -100,17 +100,7 @@ def report_responses(
     } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
     results = compute.everything(responses, options)
     tables |= results.tables
-    beside, correlated, unmeasured = None, None, ()
-    if measured is not None and codebook.factor != FRAMING:
-        measured, unmeasured = (
-            None,
-            (
-                (
-                    "Cost and fidelity are measured per framing and are not set beside worths by "
-                    f"{codebook.spoken}."
-                ),
-            ),
-        )
+    beside, correlated = None, None
     if measured is not None:
         beside = objective.against_worth(measured.table, results.tables["worths"])
         correlated = objective.correlations(beside)
@@ -120,7 +110,7 @@ def report_responses(
 
     simulated = responses.simulated
     pictures = worth_figures.draw_results(results.tables, codebook, options, simulated)
-    said = list(unmeasured)
+    said = []
     if measured is not None:
         for measure, rows in beside.groupby("measure", sort=False):
             about = objective.MEASURES[measure]

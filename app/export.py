@@ -63,8 +63,8 @@ COLUMNS = (
     Column(
         "familiarity",
         "integer",
-        "1 to 5",
-        "Self-rated familiarity with computer graphics: 1 the lowest, 5 the highest level",
+        "a level of the study",
+        "Self-rating, such as familiarity with computer graphics, from the lowest level up",
         lambda r: r.participant.familiarity,
     ),
     Column(
@@ -212,7 +212,8 @@ COLUMNS = (
         "number",
         "CSS pixels",
         (
-            "Width of each image as shown; times device_pixel_ratio it is physical pixels; empty "
+            "Width of each whole image on the page, of which its region of interest is shown; "
+            "times device_pixel_ratio it is physical pixels; empty "
             "without JavaScript"
         ),
         lambda r: r.response.shown_width,
@@ -222,8 +223,8 @@ COLUMNS = (
         "number",
         "CSS pixels",
         (
-            "Height of each image as shown; times device_pixel_ratio it is physical pixels; "
-            "empty without JavaScript"
+            "Height of each whole image on the page, of which its region of interest is shown; "
+            "times device_pixel_ratio it is physical pixels; empty without JavaScript"
         ),
         lambda r: r.response.shown_height,
     ),
@@ -320,7 +321,7 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
         "",
         *(
             f"- familiarity {value}: {label}"
-            for value, label in enumerate(asked.familiarity.labels, start=1)
+            for value, label in zip(asked.familiarity.levels, asked.familiarity.labels)
         ),
     ]
     return "\n".join(lines) + "\n"

@@ -84,14 +84,23 @@ def _digest(path: Path, _mtime_ns: int, _size: int) -> str:
 
 @blueprint.get("/study.css")
 def style() -> Response:
-    """The aspect ratio of each framing's images (the content policy allows no inline styles)."""
-    definition = study()
-    first = {image.framing: image for image in reversed(definition.manifest.images)}
-    images = [first[framing] for framing in definition.framings]
-    rules = (
-        f'[data-framing="{i}"] {{ --ratio: {image.width / image.height:.6f}; }}\n'
-        for i, image in enumerate(images)
-    )
+    """What is shown of each cell's images: the aspect ratio of their region of interest and where
+    it lies (the content policy allows no inline styles).
+    """
+    opened = study()
+    rules = []
+    for place, cell in enumerate(opened.cells):
+        image = opened.image(cell, opened.techniques[0])
+        left, top, right, bottom = image.region
+        width, height = right - left, bottom - top
+        values = {
+            "ratio": f"{image.width * width / (image.height * height):.6f}",
+            "width": f"{100 / width:.4f}%",
+            "left": f"{-100 * left / width:z.4f}%",
+            "top": f"{-100 * top / height:z.4f}%",
+        }
+        listed = " ".join(f"--{name}: {value};" for name, value in values.items())
+        rules.append(f'[data-cell="{place}"] {{ {listed} }}\n')
     response = Response("".join(rules), mimetype="text/css")
     response.headers["Cache-Control"] = "no-cache"
     return response

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.manifest import WHOLE
 from stimuli import manifest, sources
 from stimuli.errors import InputError, Stopped
 from stimuli.parts import PEOPLE
@@ -29,6 +30,8 @@ from stimuli.study import FRAMING, Cell, Study
 STATE = "build.json"
 MAPS = ("albedo_map", "normal_map", "roughness_map")
 STATE_FORMAT = "subdermal-build/2"
+#: The first edition's: its images are all rendered anew, and those that are left over removed.
+OLD_STATE_FORMAT = "subdermal-build/1"
 _ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -164,6 +167,7 @@ class _Work:
         digest = _write_png(self.out / stimulus.file, result.image, render.size)
         technique = {c.name: c.technique for c in self.study.techniques}[stimulus.condition]
         further = {k: v for k, v in stimulus.cell.levels.items() if k != FRAMING}
+        region = tuple(stimulus.scene.camera.region)
         image = {
             "framing": stimulus.cell.framing,
             **({"levels": further} if further else {}),
@@ -171,6 +175,7 @@ class _Work:
             "file": stimulus.file,
             "width": render.size[0],
             "height": render.size[1],
+            **({"region": list(region)} if region != WHOLE else {}),
             "sha256": digest,
             "parameters": {
                 "technique": technique,
@@ -359,8 +364,8 @@ def _remove_strays(out: Path, state: dict, wanted: Iterable[str]) -> None:
 
 
 def _read_state(out: Path) -> dict:
-    """The finished images by file: {"key", "image"}. Refuses a folder whose manifest is not a
-    build's.
+    """The finished images by file: {"key", "image", "licences", "notes"}; with a key that no image
+    has where the first edition made them. Refuses a folder whose manifest is not a build's.
     """
     path = out / STATE
     if not path.exists():
@@ -374,10 +379,13 @@ def _read_state(out: Path) -> dict:
         record = json.loads(path.read_bytes())
         if record["format"] == STATE_FORMAT:
             return record["images"]
+        if record["format"] == OLD_STATE_FORMAT:
+            return {file: {**done, "key": ""} for file, done in record["images"].items()}
     except (ValueError, KeyError, TypeError):
         pass
     raise InputError(
-        f"{path}: not the record of a build of this version: delete it to render everything anew"
+        f"{path}: not the record of a build of this version: choose another folder, or delete "
+        f"it and {manifest.NAME} to render everything anew"
     )
 
 

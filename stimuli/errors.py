@@ -1,10 +1,11 @@
-"""What can end the work of this package other than a defect."""
+"""What can end the work of this package other than a defect.
 
+Bad input is the analysis's InputError, since both read the same studies and manifests.
+"""
 
-class InputError(ValueError):
-    """Bad input: what was wrong, what was got and what was expected, in one line."""
+from analysis.errors import InputError
 
-    exit_code = 2
+__all__ = ["InputError", "Stopped"]
 
 
 class Stopped(Exception):

@@ -5,22 +5,15 @@ study's TOML file, `images` with `framing`, `technique`, `file`, `width`, `heigh
 """
 
 import hashlib
-import json
-import math
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from analysis.manifest import FORMATS, NAME, WHOLE, ManifestFile, open_manifest
 from stimuli.errors import InputError
 from stimuli.study import FRAMING, Cell, Study, read_study
 from stimuli.table import Table
 
-NAME = "manifest.json"
-FORMAT = "subdermal-manifest/2"
-#: What is read: 1 had no factors beside framing.
-FORMATS = ("subdermal-manifest/1", FORMAT)
-#: What `analyse` sets beside worth: samples a pixel where light is scattered, milliseconds an
-#: image, and distances to the reference.
-MEASURES = ("samples_per_pixel", "milliseconds", "dssim", "flip")
+FORMAT = FORMATS[-1]
 _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
 
 
@@ -28,8 +21,9 @@ _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".we
 class Image:
     """An image of the study; `renderer`, `head` and `scene` are None where it was made elsewhere.
 
-    measures: what it cost and how far it is from the reference, where that is known: see
-    `MEASURES`.
+    measures: what it cost and how far it is from the reference, where that is known (see
+    `analysis.manifest.MEASURES`); region: the part that the study is about, which alone is shown
+    and compared, left, top, right, bottom from 0 to 1.
     """
 
     cell: str
@@ -46,6 +40,7 @@ class Image:
     measures: dict = field(default_factory=dict)
     levels: dict = field(default_factory=dict)
     scene: dict | None = None
+    region: tuple[float, float, float, float] = WHOLE
 
     @property
     def framing(self) -> str:
@@ -80,21 +75,9 @@ def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
     pixels.
     """
     directory = Path(directory)
-    path = directory / NAME
-    try:
-        value = json.loads(path.read_bytes())
-    except FileNotFoundError as error:
-        raise InputError(
-            f"{path}: not there; `subdermal build STUDY.toml --out {directory}` writes it"
-        ) from error
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON: {error}") from error
-    if not isinstance(value, dict):
-        raise InputError(f"{path}: got {type(value).__name__}, expected a table")
-
-    table = Table(value, str(path))
+    file = open_manifest(directory / NAME)
+    value = dict(file.value)
+    table = Table(value, str(file.path))
     table.one_of("format", FORMATS)
     study_table = table.table("study")
     study = read_study(study_table)
@@ -102,7 +85,7 @@ def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
     entries = table.tables("images", least=1)
     for entry in entries:
         entry.value = {key: value for key, value in entry.value.items() if value is not None}
-    images = tuple(_image(entry, study, directory) for entry in entries)
+    images = tuple(_image(entry, study, file, place) for place, entry in enumerate(entries))
     licences = table.tables("licences", least=0) if "licences" in value else []
     for licence in licences:
         for key in ("what", "licence", "source"):
@@ -121,7 +104,7 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _image(entry: Table, study: Study, directory: Path) -> Image:
+def _image(entry: Table, study: Study, manifest: ManifestFile, place: int) -> Image:
     def inside(text: str) -> bool:
         parts = PurePosixPath(text)
         return (
@@ -138,7 +121,7 @@ def _image(entry: Table, study: Study, directory: Path) -> Image:
         cell=_cell(entry, study).name,
         technique=entry.one_of("technique", (condition.name for condition in study.techniques)),
         file=file,
-        path=directory / file,
+        path=manifest.path.parent / file,
         width=entry.number("width", 1, 65535),
         height=entry.number("height", 1, 65535),
         sha256=entry.take("sha256", str, "64 hexadecimal digits in small letters", _is_sha256),
@@ -146,10 +129,13 @@ def _image(entry: Table, study: Study, directory: Path) -> Image:
         seed=entry.take("seed", int, default=None),
         renderer=entry.take("renderer", dict, default=None),
         head=entry.take("head", dict, default=None),
-        measures=_measures(entry.table("measures", default={})),
+        measures=manifest.measures(place),
         levels=_cell(entry, study).levels,
         scene=entry.take("scene", dict, default=None),
+        region=manifest.region(place),
     )
+    for key in ("measures", "region"):
+        entry.take(key, object, "anything", default=None)
     entry.end()
     return image
 
@@ -168,26 +154,15 @@ def _cell(entry: Table, study: Study) -> Cell:
     raise entry.fault("levels", levels, "levels of one of the study's cells")
 
 
-def _measures(table: Table) -> dict:
-    for key in MEASURES:
-        table.take(
-            key,
-            (int, float),
-            "a number from 0",
-            lambda value: not isinstance(value, bool) and 0 <= value < math.inf,
-            default=0,
-        )
-    table.end()
-    return table.value
-
-
 def _is_sha256(text: str) -> bool:
     return len(text) == 64 and set(text) <= set("0123456789abcdef")
 
 
 def _one_each(study: Study, images: tuple[Image, ...], entries: list[Table], table: Table) -> None:
-    """Each cell and technique has one image, of a file of its own, in one size a framing."""
-    seen, files, sizes = {}, {}, {}
+    """Each cell and technique has one image, of a file of its own, in one size a framing and with
+    one region a cell.
+    """
+    seen, files, sizes, regions = {}, {}, {}, {}
     for image, entry in zip(images, entries):
         pair, size = (image.cell, image.technique), (image.width, image.height)
         if pair in seen:
@@ -204,6 +179,12 @@ def _one_each(study: Study, images: tuple[Image, ...], entries: list[Table], tab
                 "width, height",
                 size,
                 f"{sizes[image.framing]}, as the other images at {image.framing}",
+            )
+        if regions.setdefault(image.cell, image.region) != image.region:
+            raise entry.fault(
+                "region",
+                list(image.region),
+                f"{list(regions[image.cell])}, as the other images at {image.cell}",
             )
         seen[pair] = files[image.file] = entry.key
     for cell in study.cells:

@@ -14,6 +14,8 @@ from itertools import product
 from math import prod
 from pathlib import Path
 
+from analysis.declared import options
+from analysis.manifest import WHOLE, read_region, read_self_rating
 from stimuli.errors import InputError
 from stimuli.parts import read_toml
 from stimuli.scenes import load_table, merge
@@ -65,12 +67,14 @@ _WORDING = ("question", "scale", "familiarity", "consent")
 class Level:
     """A level of a factor: its name in files and tables, its label for people.
 
-    patch: what it changes in the scene's table (stimuli.scenes.merge).
+    patch: what it changes in the scene's table (stimuli.scenes.merge); region: the part of the
+    image that a framing is about, left, top, right, bottom from 0 to 1.
     """
 
     name: str
     label: str
     patch: dict = field(default_factory=dict)
+    region: tuple[float, float, float, float] = WHOLE
 
 
 @dataclass(frozen=True)
@@ -130,10 +134,11 @@ class ScalePoint:
 
 @dataclass(frozen=True)
 class Familiarity:
-    """The self-rating; label i stands for the value i + 1."""
+    """The self-rating: labels[i] stands for the value levels[i]."""
 
     question: str
     labels: tuple[str, ...]
+    levels: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -210,7 +215,8 @@ class Study:
         """What the manifest says of the study; `read_study` reads it back."""
 
         def named(level: Level) -> dict:
-            return {"name": level.name, "label": level.label}
+            region = {"region": list(level.region)} if level.region != WHOLE else {}
+            return {"name": level.name, "label": level.label, **region}
 
         more = [
             {"name": f.name, "label": f.label, "levels": [named(level) for level in f.levels]}
@@ -231,6 +237,7 @@ class Study:
             "familiarity": {
                 "question": self.familiarity.question,
                 "labels": list(self.familiarity.labels),
+                "levels": list(self.familiarity.levels),
             },
             "consent": self.consent,
             **({"analysis": self.analysis} if self.analysis else {}),
@@ -299,7 +306,7 @@ def read_study(table: Table, render: Render | None = None, scene: dict | None = 
         consent=_consent(wording),
         render=render,
         scene=scene,
-        analysis=_analysis(table.table("analysis", default={})),
+        analysis=_analysis(table),
     )
     refuse_doubles(techniques, "name")
     refuse_doubles(techniques, "label")
@@ -331,14 +338,15 @@ def _factors(table: Table, rendered: bool) -> tuple[Factor, ...]:
 def _levels(tables: list[Table], factor: str, rendered: bool) -> tuple[Level, ...]:
     levels = []
     for table in tables:
-        name, patch = table.name("name"), {}
+        name, patch, region = table.name("name"), {}, WHOLE
         if rendered:
             patch = table.take("set", dict, "a table that is merged onto the scene's", default=None)
             patch = _shorthand(table, factor, name) if patch is None else patch
-            region = table.take("region", list, "[left, top, right, bottom]", default=None)
-            if region is not None:
-                patch = merge(patch, {"camera": {"region": region}})
-        levels.append(Level(name, table.text("label"), patch))
+        if factor == FRAMING and "region" in table.value:
+            given = table.take("region", list, "[left, top, right, bottom]")
+            region = read_region(f"{table.source}: {table.at('region')}", given)
+            patch = merge(patch, {"camera": {"region": given}}) if rendered else patch
+        levels.append(Level(name, table.text("label"), patch, region))
         table.end()
     refuse_doubles(tables, "name")
     refuse_doubles(tables, "label")
@@ -435,62 +443,21 @@ def _scale(table: Table) -> tuple[ScalePoint, ...]:
 
 
 def _familiarity(table: Table) -> Familiarity:
-    def five_texts(value: list) -> bool:
-        return len(value) == 5 and all(isinstance(text, str) and text.strip() for text in value)
-
-    labels = table.take(
-        "labels", list, "a list of 5 texts, from the lowest to the highest", five_texts
-    )
-    familiarity = Familiarity(table.text("question"), tuple(labels))
+    labels, levels = read_self_rating(f"{table.source}: {table.key}", table.value)
+    for key in ("labels", "levels"):
+        table.take(key, list, default=None)
+    familiarity = Familiarity(table.text("question"), labels, levels)
     table.end()
     return familiarity
 
 
 def _analysis(table: Table) -> dict:
-    """What the study declares of its analysis before anybody is asked, as `analysis.options` names
-    it; a rule that is false is off.
+    """What the study declares of its analysis before anybody is asked, as it was written; checked
+    by `analysis.declared.options`, which says what may be declared.
     """
-
-    def number(of: Table, key: str, low: float, high: float, off: bool = False) -> None:
-        def valid(value: float | bool) -> bool:
-            return (off and value is False) or (
-                not isinstance(value, bool) and low <= value <= high
-            )
-
-        of.take(
-            key,
-            (int, float),
-            f"a number from {low:g} to {high:g}" + (" or false" if off else ""),
-            valid,
-            default=0,
-        )
-
-    number(table, "margin", 0.001, 4)
-    number(table, "margin_jod", 0.001, 20)
-    number(table, "level", 0.501, 0.999)
-    table.number("resamples", 100, 1_000_000, default=0)
-    table.number("seed", 0, 2**63 - 1, default=0)
-    for key, known in (
-        ("test", ("wilcoxon", "sign")),
-        ("family", ("study", "framing")),
-        ("ties", ("half", "drop")),
-        ("fallback", ("reduced_bias", "none")),
-    ):
-        table.take(
-            key,
-            str,
-            f"one of {', '.join(known)}",
-            lambda text, known=known: text in known,
-            default=known[0],
-        )
-    rules = table.table("exclusions", default={})
-    for key in ("answered_share", "one_side_share", "same_answer_share", "repeat_share"):
-        number(rules, key, 0, 1, off=True)
-    number(rules, "median_rt_ms", 0, 1e9, off=True)
-    number(rules, "zeta", -1, 1, off=True)
-    rules.end()
-    table.end()
-    return table.value
+    declared = table.take("analysis", dict, default={})
+    options(declared, f"{table.source}: {table.at('analysis')}")
+    return declared
 
 
 def _size(table: Table) -> tuple[int, int]:

@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 MAY_IMPORT = {
     "renderer": set(),
     "analysis": set(),
-    "stimuli": {"renderer"},
+    # what a manifest and a declared analysis are: one schema, standard library alone
+    "stimuli": {"renderer", "analysis.declared", "analysis.errors", "analysis.manifest"},
     "app": {"analysis", "stimuli.design", "stimuli.errors", "stimuli.manifest", "stimuli.study"},
 }
 PROFILE_VERBS = {
@@ -142,6 +143,17 @@ def test_application_never_imports_opengl():
     modules = set(run.stdout.split())
     assert "flask" in modules
     assert not modules & {"OpenGL", "pyrender", "pyglet", "renderer"}
+
+
+def test_a_study_is_checked_without_the_statistics():
+    """stimuli takes the schema of manifests and of [analysis] from analysis, and no more."""
+    program = "import sys, stimuli.study, stimuli.manifest; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    modules = set(run.stdout.split())
+    assert "analysis.declared" in modules
+    assert not modules & {"scipy", "pandas", "matplotlib", "renderer"}
 
 
 def test_profiles_never_import_opengl():

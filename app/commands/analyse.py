@@ -131,7 +131,8 @@ def command(
     """
     from analysis import declared as declarations
     from analysis.ahp import read_matrices
-    from analysis.codebook import FRAMING, is_manifest, read_manifest
+    from analysis.codebook import FRAMING, read_manifest
+    from analysis.manifest import is_manifest, open_manifest
     from analysis.objective import read_measures
     from analysis.report import report_matrices, report_responses, write_files
     from analysis.responses import read_responses
@@ -159,7 +160,9 @@ def command(
             study = beside
         else:
             notes = ("The manifest.json beside the table is not one of a study; it was not used.",)
-    answers = read_responses(responses, study and read_manifest(study), order, factor or FRAMING)
+    manifest = open_manifest(study) if study is not None else None
+    codebook = read_manifest(manifest) if manifest else None
+    answers = read_responses(responses, codebook, order, factor or FRAMING)
     answers = replace(answers, notes=notes + answers.notes)
     options = [
         (option, ",".join(value))
@@ -174,7 +177,7 @@ def command(
     ]
     if study is not None:
         options.append(("--study", study.name))
-    declared = declarations.read_declared(study) if study is not None else {}
+    declared = manifest.declared if manifest else {}
     chosen = declarations.options(declared, f"{study}: study.analysis", **choices)
     files = report_responses(
         answers,
@@ -182,7 +185,7 @@ def command(
         _written((responses.name,), *options),
         chosen,
         _source(declared, choices),
-        read_measures(study, reference) if study is not None else None,
+        read_measures(manifest, reference, factor or FRAMING) if manifest else None,
     )
     write_files(files, out)
 

@@ -47,7 +47,7 @@ def participants(db: Session) -> list[dict[str, Any]]:
     ):
         times.setdefault(participant, []).append(rt_ms)
         last[participant] = max(at, last.get(participant, at))
-    asked = dict(
+    questions = dict(
         db.execute(select(Trial.participant_id, func.count()).group_by(Trial.participant_id)).all()
     )
     result = []
@@ -65,7 +65,7 @@ def participants(db: Session) -> list[dict[str, Any]]:
                 "familiarity": person.familiarity,
                 "began": person.consented_at.strftime("%Y-%m-%d %H:%M"),
                 "answered": len(answered),
-                "asked": asked.get(person.id, 0),
+                "questions": questions.get(person.id, 0),
                 "state": state,
                 "median_s": round(median(answered) / 1000, 1) if answered else None,
             }
@@ -81,10 +81,10 @@ def framings(db: Session, study: Study, *, simulated: bool) -> list[dict[str, An
     if not records:
         return []
     from analysis import ahp, tallies
-    from analysis.codebook import read_manifest
+    from analysis.codebook import of_study
     from analysis.responses import responses_from_records
 
-    responses = responses_from_records(records, read_manifest(study.directory))
+    responses = responses_from_records(records, of_study(study.definition.record()))
     points = {
         (row.framing, row.technique): row.score for row in tallies.scores(responses).itertuples()
     }

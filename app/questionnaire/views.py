@@ -77,8 +77,9 @@ def familiarity():
 
 @blueprint.post("/familiarity")
 def rate():
-    value = _integer("familiarity", 1, len(study().definition.familiarity.labels))
-    if value is None:
+    levels = study().definition.familiarity.levels
+    value = _integer("familiarity", levels[0], levels[-1])
+    if value not in levels:
         flash("Please choose one of the levels.")
         return redirect(url_for(".familiarity"), 303)
     with database().write() as db:
@@ -101,7 +102,7 @@ def question():
             "questionnaire/question.html",
             participant=participant,
             trial=trial,
-            framing=study().framings.index(study().definition.cell(trial.cell).framing),
+            cell=study().cells.index(trial.cell),
             images=_images(trial),
             upcoming=_images(flow.following(db, trial)),
             **_progress(db, participant),

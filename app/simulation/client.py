@@ -135,10 +135,15 @@ class Visitor:
         The page names neither (people must not know): the hashes tell.
         """
         left, right = (
-            self._study.images_by_sha256[form.fields[name]]
+            {
+                image.cell: image.technique
+                for image in self._study.manifest.images
+                if image.sha256 == form.fields[name]
+            }
             for name in ("image_left", "image_right")
         )
-        return left.cell, left.technique, right.technique
+        cell = next(cell for cell in left if cell in right)  # one image may serve several cells
+        return cell, left[cell], right[cell]
 
     def _get(self, http: httpx.Client, path: str) -> httpx.Response:
         return _checked(http.get(urljoin(self._base, path)))

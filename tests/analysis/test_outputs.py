@@ -356,6 +356,39 @@ def test_distances_to_the_reference_come_from_the_images(tmp_path):
     assert "not beside the manifest" in " ".join(objective.read_measures(tmp_path).notes)
 
 
+def test_an_image_is_compared_within_its_cell_over_its_region(tmp_path):
+    """Two people: each one's images go by their own reference; a factor's values are means over the
+    cells of its level; what lies outside of the region does not count.
+    """
+    rng = np.random.default_rng(2)
+    images = []
+    for place, person in enumerate(("anna", "bert")):
+        face = rng.integers(60, 180, (24, 40, 3), np.uint8)
+        for light in ("noon", "dusk"):
+            for name in ("reference", "near"):
+                picture = face + (place + 1) * 20 * (name == "near" and light == "dusk")
+                if name == "near":
+                    picture[:, 20:] = 0  # outside
+                file = f"{person}-{light}-{name}.png"
+                Image.fromarray(picture.astype(np.uint8)).save(tmp_path / file)
+                levels = {"person": person, "light": light}
+                images.append({"framing": "x", "levels": levels, "technique": name, "file": file})
+                images[-1] |= {"region": [0, 0, 0.5, 1], "measures": {"milliseconds": place}}
+    folder = manifest(tmp_path, images)
+
+    def values(factor, measure):
+        table = objective.read_measures(folder, factor=factor).table
+        table = table[(table.measure == measure) & (table.technique == "near")]
+        return dict(zip(table.framing, table.value, strict=True))
+
+    lights, people = values("light", "flip"), values("person", "flip")
+    assert lights["noon"] == pytest.approx(0, abs=1e-6) and lights["dusk"] > 0.01
+    assert 0 < people["anna"] < people["bert"]
+    assert values("framing", "flip") == {"x": pytest.approx(np.mean(list(lights.values())))}
+    assert values("person", "milliseconds") == {"anna": 0.0, "bert": 1.0}
+    assert "Images have no day" in " ".join(objective.read_measures(folder, factor="day").notes)
+
+
 def test_the_front_is_what_no_other_beats_in_both():
     measured = pd.DataFrame(
         [

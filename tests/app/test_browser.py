@@ -2,6 +2,7 @@
 of every size.
 """
 
+import json
 import re
 import shutil
 
@@ -316,3 +317,22 @@ def test_the_simulated_study_is_marked(page, study_dir):
         page.goto(address)
         expect(page.locator(".simulated")).to_be_visible()
         assert page.title().startswith("SIMULATED")
+
+
+def test_only_the_region_of_interest_is_shown(study_dir, chromium):
+    """The right half of each image fills its frame; the rest is there and cut off."""
+    manifest = json.loads((study_dir / "manifest.json").read_text())
+    for framing in manifest["study"]["framings"]:
+        framing["region"] = [0.5, 0.25, 1, 0.75]
+    (study_dir / "manifest.json").write_text(json.dumps(manifest))
+    with running(create_app(study_dir)) as address:
+        with chromium.new_context(viewport={"width": 1280, "height": 720}) as context:
+            page = context.new_page()
+            begin(page, address)
+            frame, image = page.locator(".region").first, page.locator(".pair img").first
+            shown, whole = frame.bounding_box(), image.bounding_box()
+            assert shown["width"] / shown["height"] == pytest.approx(960 / 540, rel=0.01)
+            assert whole["width"] == pytest.approx(2 * shown["width"], rel=0.01)
+            assert whole["height"] == pytest.approx(2 * shown["height"], rel=0.01)
+            assert whole["x"] == pytest.approx(shown["x"] - shown["width"], abs=1)
+            assert whole["y"] == pytest.approx(shown["y"] - shown["height"] / 2, abs=1)

@@ -117,6 +117,7 @@ def test_live_numbers_follow_the_answers(person, experimenter, app):
     assert framing["name"] == trial.cell and framing["total"] == 2 and framing["cr"] is None
     assert {t["name"]: t["score"] for t in framing["techniques"]} == {trial.right: 2, trial.left: 0}
     assert after["participants"][0]["answered"] == 1 and "at " + trial.cell in after["html"]
+    assert "1 / 30" in " ".join(after["html"].split())
 
 
 def test_priorities_appear_when_every_pair_is_answered(person, experimenter):

@@ -89,6 +89,26 @@ def table(folder):
     return path
 
 
+def test_the_page_shows_the_region_of_each_cell(folder, tmp_path):
+    """The style sheet crops each cell's images to their region, in percent of what is shown."""
+    import shutil
+
+    copy = tmp_path / "regions"
+    shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*.sqlite3*"))
+    manifest = json.loads((copy / "manifest.json").read_text())
+    for image in manifest["images"]:
+        if image["levels"] == {"person": "anna", "light": "noon"}:
+            image["region"] = [0.25, 0.5, 0.75, 1]
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    app = create_app(copy)
+    rules = app.test_client().get("/study.css").text.splitlines()
+    whole = "--ratio: 1.000000; --width: 100.0000%; --left: 0.0000%; --top: 0.0000%;"
+    assert rules[0] == f'[data-cell="0"] {{ {whole} }}'
+    part = "--ratio: 1.000000; --width: 200.0000%; --left: -50.0000%; --top: -100.0000%;"
+    assert rules[1] == f'[data-cell="1"] {{ {part} }}'
+    assert len(rules) == len(app.extensions["study"].cells) == 4
+
+
 def test_every_answer_is_used_by_each_factor(folder, table):
     header = table.read_text().splitlines()[0].split(",")
     assert header[2:5] == ["framing", "person", "light"]

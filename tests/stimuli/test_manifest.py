@@ -56,7 +56,7 @@ def test_own_question_and_scale_are_kept(change):
     [
         (
             lambda m: m.update(format="other/1"),
-            r"format: got 'other/1', expected one of subdermal-manifest/1, subdermal-manifest/2",
+            r"format is 'other/1', expected one of subdermal-manifest/1, subdermal-manifest/2",
         ),
         (lambda m: m.update(extra=1), r"extra: unknown key"),
         (lambda m: m.pop("study"), r"study: missing, expected a table"),
@@ -69,11 +69,19 @@ def test_own_question_and_scale_are_kept(change):
         (lambda m: m.update(images=[]), r"images: got \[\], expected a list of at least 1 tables"),
         (
             lambda m: m["images"][0].update(measures={"ms": 1}),
-            r"images\[0\]\.measures\.ms: unknown key",
+            r"images\[0\]\.measures names 'ms', expected one of samples_per_pixel",
         ),
         (
             lambda m: m["images"][0].update(measures={"dssim": -1}),
-            r"images\[0\]\.measures\.dssim: got -1, expected a number from 0",
+            r"images\[0\]\.measures\.dssim is -1, expected a number from 0",
+        ),
+        (
+            lambda m: m["images"][0].update(region=[0, 0, 2, 1]),
+            r"images\[0\]\.region is \[0, 0, 2, 1\], expected \[left, top, right, bottom\]",
+        ),
+        (
+            lambda m: m["images"][0].update(region=[0, 0, 0.5, 1]),
+            r"images\[1\]\.region: got .*, expected \[0\.0, 0\.0, 0\.5, 1\.0\], as the other",
         ),
         (lambda m: m["images"].pop(), r"images: none of blender at far"),
         (
@@ -142,15 +150,26 @@ def test_file_that_is_no_image(change, ready_made):
         load_manifest(change(lambda m: m["images"][0].update(sha256=digest)))
 
 
+def test_images_have_the_region_of_their_framing_or_their_own(change):
+    def regions(manifest):
+        manifest["study"]["framings"][0]["region"] = [0, 0, 0.5, 1]
+        for image in manifest["images"][2:]:
+            image["region"] = [0.25, 0.25, 0.75, 0.75]
+
+    images = load_manifest(change(regions)).images
+    assert {image.region for image in images[:2]} == {(0, 0, 0.5, 1)}
+    assert {image.region for image in images[2:]} == {(0.25, 0.25, 0.75, 0.75)}
+
+
 def test_no_manifest_names_the_command_that_writes_one(tmp_path):
     with pytest.raises(
-        InputError, match="manifest.json: not there; `subdermal build STUDY.toml --out"
+        InputError, match="manifest.json: cannot be read: .* `subdermal build STUDY.toml --out"
     ):
         load_manifest(tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("{", "not JSON"), ("[]", "got list, expected a table")]
+    ("text", "message"), [("{", "not JSON"), ("[]", "format is 'list', expected one of")]
 )
 def test_no_table(tmp_path, text, message):
     (tmp_path / "manifest.json").write_text(text)

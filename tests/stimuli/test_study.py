@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from analysis.declared import options
 from stimuli.errors import InputError
 from stimuli.scenes import load_table, read_scene
 from stimuli.study import THESIS, Study, load_study, read_study
@@ -59,6 +60,39 @@ def test_what_is_declared_of_the_analysis_is_kept_as_written(small_study, write_
     )
     assert study.analysis == {"margin": 0.3, "exclusions": {"zeta": False}}
     assert read_study(Table(study.record(), "manifest")).analysis == study.analysis
+
+
+def test_analysis_is_checked_once_with_one_answer(write_toml):
+    """0.9995 was refused by the study and taken by the analysis; 1 by neither."""
+    text = write_toml().read_text()
+    study = load_study(write_toml(text + "\n[analysis]\nlevel = 0.9995\n"))
+    assert options(study.analysis).level == 0.9995
+    with pytest.raises(InputError, match="analysis.level is 1, expected a number between") as one:
+        load_study(write_toml(text + "\n[analysis]\nlevel = 1\n"))
+    with pytest.raises(InputError) as other:
+        options({"level": 1}, str(one.value).partition(".level")[0])
+    assert str(one.value) == str(other.value)
+
+
+def test_a_framing_carries_its_region(write_toml):
+    text = (
+        write_toml().read_text().replace('name = "near"', 'name = "near"\nregion = [0, 0, 0.5, 1]')
+    )
+    study = load_study(write_toml(text))
+    near, far = study.cells
+    assert study.scene_of(near)["camera"]["region"] == [0, 0, 0.5, 1]
+    assert "region" not in study.scene_of(far).get("camera", {})
+    assert study.record()["framings"][0]["region"] == [0.0, 0.0, 0.5, 1.0]
+    assert "region" not in study.record()["framings"][1]
+    with pytest.raises(InputError, match=r"framings\[0\]\.region is .*, expected .left, top"):
+        load_study(write_toml(text.replace("0.5, 1]", "0.5, 2]")))
+
+
+def test_a_study_has_its_own_levels_of_the_self_rating(write_toml):
+    rating = '[familiarity]\nquestion = "?"\nlabels = ["never", "daily"]\nlevels = [0, 7]\n[render]'
+    study = load_study(write_toml(write_toml().read_text().replace("[render]", rating, 1)))
+    assert (study.familiarity.labels, study.familiarity.levels) == (("never", "daily"), (0, 7))
+    assert read_study(Table(study.record(), "manifest")).familiarity == study.familiarity
 
 
 def test_head_file_lies_beside_the_study(write_toml):
@@ -218,8 +252,8 @@ def test_consent_knows_its_placeholders(write_toml):
         ),
         (
             "[render]",
-            '[familiarity]\nquestion = "?"\nlabels = ["a", "b"]\n[render]',
-            r"familiarity\.labels: .* 5 texts",
+            '[familiarity]\nquestion = "?"\nlabels = ["a"]\n[render]',
+            r"familiarity\.labels is .*, expected texts, two or more",
         ),
         (
             "[render]",
@@ -230,32 +264,32 @@ def test_consent_knows_its_placeholders(write_toml):
         (
             "[render]",
             "[analysis]\nmargins = 1\n[render]",
-            r"analysis\.margins: unknown key, did you mean 'margin'",
+            r"analysis names the unknown margins; did you mean 'margin'",
         ),
         (
             "[render]",
             "[analysis]\nmargin = 0\n[render]",
-            r"analysis\.margin: got 0, expected a number from 0\.001 to 4",
+            r"analysis\.margin is 0, expected a number above 0",
         ),
         (
             "[render]",
             "[analysis]\nmargin = true\n[render]",
-            r"analysis\.margin: got True, expected a number",
+            r"analysis\.margin is True, expected a number",
         ),
         (
             "[render]",
             '[analysis]\ntest = "t"\n[render]',
-            r"analysis\.test: got 't', expected one of wilcoxon, sign",
+            r"analysis\.test is 't', expected one of wilcoxon, sign",
         ),
         (
             "[render]",
             "[analysis.exclusions]\nzeta = 2\n[render]",
-            r"analysis\.exclusions\.zeta: got 2, expected a number from -1 to 1",
+            r"analysis\.exclusions\.zeta is 2, expected a number from -1 to 1",
         ),
         (
             "[render]",
             "[analysis.exclusions]\nspeed = 2\n[render]",
-            r"analysis\.exclusions\.speed: unknown key",
+            r"analysis\.exclusions names the unknown speed",
         ),
     ],
 )
