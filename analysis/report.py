@@ -8,9 +8,7 @@ report comes last.
 from __future__ import annotations
 
 import base64
-import os
 import re
-import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -36,6 +34,7 @@ from analysis.conclusions import count as _count
 from analysis.conclusions import listed as _listed
 from analysis.declared import UNDECLARED
 from analysis.errors import InputError
+from analysis.files import replacing
 from analysis.methods import rejected_rows
 from analysis.methods import versions as _versions
 from analysis.objective import Measured
@@ -256,15 +255,8 @@ def write_files(files: Mapping[str, bytes], out: str | Path) -> None:
         for name, content in files.items():
             path = out / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle, part = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    file.write(content)
-                os.chmod(part, 0o644)
-                os.replace(part, path)
-            except BaseException:
-                os.unlink(part)
-                raise
+            with replacing(path) as part:
+                part.write_bytes(content)
     except OSError as error:
         raise InputError(
             f"{error.filename or out}: cannot be written: {error.strerror}; expected a folder "

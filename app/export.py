@@ -17,6 +17,7 @@ from typing import Any
 from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
 
+from analysis.files import replacing
 from app.models import Participant, Response, Trial
 from app.study import Study
 from stimuli.study import FRAMING
@@ -332,17 +333,15 @@ def write(directory: Path, session: Session, study: Study, *, simulated: bool) -
     answers.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    _replace(directory / "codebook.csv", codebook_csv(study))
-    _replace(directory / "codebook.md", [codebook_md(study, simulated=simulated)])
-    _replace(directory / "responses.csv", responses_csv(session, study, simulated=simulated))
+    _write(directory / "codebook.csv", codebook_csv(study))
+    _write(directory / "codebook.md", [codebook_md(study, simulated=simulated)])
+    _write(directory / "responses.csv", responses_csv(session, study, simulated=simulated))
     return count(session)
 
 
-def _replace(path: Path, parts: Iterable[str]) -> None:
-    partial = path.with_name(path.name + ".partial")
-    with partial.open("w", encoding="utf-8", newline="") as file:
+def _write(path: Path, parts: Iterable[str]) -> None:
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         file.writelines(parts)
-    partial.replace(path)
 
 
 def _csv(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> Iterator[str]:

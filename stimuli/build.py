@@ -10,10 +10,8 @@ a file. The manifest is written last, and is not there while images are missing.
 import dataclasses
 import hashlib
 import json
-import os
 import subprocess
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.files import replacing
 from analysis.manifest import WHOLE
 from stimuli import manifest, sources
 from stimuli.errors import InputError, Stopped
@@ -398,27 +397,16 @@ def _write_png(path: Path, pixels: np.ndarray, size: tuple[int, int]) -> str:
             f"{path}: rendered {pixels.shape} {pixels.dtype}, expected "
             f"{(size[1], size[0], 3)} uint8"
         )
-    with _replacing(path) as temporary:
+    with replacing(path) as temporary:
         PIL.Image.fromarray(pixels).save(temporary, format="PNG")
         return manifest.sha256(temporary)
 
 
 def _write_json(path: Path, record: dict) -> None:
-    with _replacing(path) as temporary:
+    with replacing(path) as temporary:
         temporary.write_text(
             json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
         )
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """A file to write beside `path`, which takes its place when the block ends well."""
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _jsonable(parameters: Any) -> dict:

@@ -12,7 +12,13 @@ MAY_IMPORT = {
     "renderer": set(),
     "analysis": set(),
     # what a manifest and a declared analysis are: one schema, standard library alone
-    "stimuli": {"renderer", "analysis.declared", "analysis.errors", "analysis.manifest"},
+    "stimuli": {
+        "renderer",
+        "analysis.declared",
+        "analysis.errors",
+        "analysis.files",
+        "analysis.manifest",
+    },
     "app": {"analysis", "stimuli.design", "stimuli.errors", "stimuli.manifest", "stimuli.study"},
 }
 PROFILE_VERBS = {

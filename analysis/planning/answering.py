@@ -52,6 +52,12 @@ class Answering:
         """Standard deviation of the noise of one question, in JOD."""
         return math.sqrt(SIGMA**2 - self.taste**2)
 
+    def answer(self, felt: float | np.ndarray) -> np.ndarray:
+        """The answer, -2 to 2, to a difference as it is felt, taste and noise included, in JOD."""
+        size = np.abs(felt)
+        strength = (size >= self.slight).astype(np.int8) + (size >= self.clear)
+        return (np.sign(felt) * strength).astype(np.int8)
+
     def shares(self, difference: float | np.ndarray) -> np.ndarray:
         """(..., 5): how often each of the answers -2 to 2 is given about a pair with that true
         difference in JOD.

@@ -154,10 +154,7 @@ def answers(plan: Plan, worths: np.ndarray, studies: int, rng: np.random.Generat
     own += worths.astype(np.float32)
     d = own[..., b] - own[..., a]
     d += np.float32(model.noise) * rng.standard_normal(d.shape, np.float32)
-    size = np.abs(d)
-    return (np.sign(d) * ((size >= model.slight).astype(np.int8) + (size >= model.clear))).astype(
-        np.int8
-    )
+    return model.answer(d)
 
 
 def chosen(plan: Plan, answers: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -1,12 +1,9 @@
-"""How simulated participants judge: latent worths for each framing, noise, and a reluctance to see
-a difference.
+"""Who the simulated participants are: their worths at each cell, their tastes, how long they take.
 
-A participant looks at d = GAIN (worth of right - worth of left) + SIDE_BIAS + noise, noise ~ N(0,
-NOISE), and answers 0 where |d| is below `SLIGHT` times the framing's reluctance, +-2 where it is
-above `CLEAR` times it, else +-1.
-
-Worths are the centred natural logarithms of the AHP priorities that the thesis published
-(study.md): in the thesis's design they come out near the published findings: golubev and
+How they turn what they see into answers is `analysis.planning.answering`, the model that `subdermal
+power` plans with; thresholds grow with distance, since differences are harder to see from farther
+away. Worths are the centred natural logarithms of the AHP priorities that the thesis published
+(study.md), in JOD: in the thesis's design they come out near the published findings: golubev and
 golubev_plus ahead at close-up, all flatter with distance. They say how simulated answers were made,
 and nothing about people.
 """
@@ -14,8 +11,10 @@ and nothing about people.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from random import Random
 
+from analysis.planning.answering import Answering
 from app.study import Study
 from stimuli.study import Cell
 
@@ -43,17 +42,17 @@ PUBLISHED_PRIORITIES = {
         "jimenez_gaussian": 0.1785,
     },
 }
-GAIN = 1.2
-NOISE = 0.7
-SIDE_BIAS = 0.0
-SLIGHT, CLEAR = 0.45, 1.35
-RELUCTANCE_STEP = (
-    0.3  # added for each framing after the first: differences are harder to see from farther away
-)
-#: Spread of the worths of a technique or framing that the thesis did not have, drawn from the seed.
-UNKNOWN_SPREAD = 0.4
-#: Spread that each combination of further levels (person, light, ...) adds.
-LEVEL_SPREAD = 0.15
+#: JOD that a natural logarithm of priorities counts.
+GAIN_JOD = 2.5
+#: At the first framing; at each after it both thresholds are by so large a share of these higher.
+ANSWERING = Answering(slight=0.95, clear=2.85, taste=0.5)
+RELUCTANCE_STEP = 0.3
+#: Spread of the worths, JOD, of a technique or framing that the thesis did not have, drawn from the
+#: seed.
+UNKNOWN_SPREAD_JOD = 1.0
+#: Spread that each combination of further levels (person, light, ...) adds, JOD.
+LEVEL_SPREAD_JOD = 0.4
+#: Of five levels; of another number, each is as likely.
 FAMILIARITY_SHARES = (0.15, 0.25, 0.3, 0.2, 0.1)
 MEDIAN_RT_MS, RT_SPREAD = 6500, 0.5  # log-normal
 
@@ -64,41 +63,53 @@ class Crowd:
     """
 
     def __init__(self, study: Study, seed: int):
-        self._seed = seed
+        self._seed, self._levels = seed, study.definition.familiarity.levels
+        self._cells = {cell.name: cell for cell in study.definition.cells}
         place = {framing: k for k, framing in enumerate(study.framings)}
-        self._worths, self._reluctance = {}, {}
-        for cell in study.definition.cells:
+        self._worths, self._answering = {}, {}
+        for cell in self._cells.values():
             self._worths[cell.name] = self._cell_worths(study, cell)
-            self._reluctance[cell.name] = 1 + RELUCTANCE_STEP * place[cell.framing]
+            step = 1 + RELUCTANCE_STEP * place[cell.framing]
+            self._answering[cell.name] = replace(
+                ANSWERING, slight=step * ANSWERING.slight, clear=step * ANSWERING.clear
+            )
 
     def familiarity(self, participant: int) -> int:
-        """1 to 5."""
-        return self._random(participant, "familiarity").choices(range(1, 6), FAMILIARITY_SHARES)[0]
+        """One of the study's levels."""
+        five = len(self._levels) == len(FAMILIARITY_SHARES)
+        draw = self._random(participant, "familiarity")
+        return draw.choices(self._levels, FAMILIARITY_SHARES if five else None)[0]
 
     def answer(
         self, participant: int, order: int, cell: str, left: str, right: str
     ) -> tuple[int, int]:
         """The answer, -2 to 2 (negative: left), and the time it took, ms."""
-        random = self._random(participant, order)
-        worths, reluctance = self._worths[cell], self._reluctance[cell]
-        d = GAIN * (worths[right] - worths[left]) + SIDE_BIAS + random.gauss(0, NOISE)
-        strength = (abs(d) > SLIGHT * reluctance) + (abs(d) > CLEAR * reluctance)
-        rt_ms = round(MEDIAN_RT_MS * math.exp(random.gauss(0, RT_SPREAD)))
-        return int(math.copysign(strength, d)), rt_ms
+        draw, model = self._random(participant, order), self._answering[cell]
+        better = self._own_worth(participant, cell, right) - self._own_worth(
+            participant, cell, left
+        )
+        answer = int(model.answer(better + draw.gauss(0, model.noise)))
+        return answer, round(MEDIAN_RT_MS * math.exp(draw.gauss(0, RT_SPREAD)))
+
+    def _own_worth(self, participant: int, cell: str, technique: str) -> float:
+        """What a participant feels of a technique, JOD: a taste goes with a framing."""
+        draw = self._random("taste", participant, self._cells[cell].framing, technique)
+        spread = self._answering[cell].taste / math.sqrt(2)  # of one of the two in a difference
+        return self._worths[cell][technique] + draw.gauss(0, spread)
 
     def _cell_worths(self, study: Study, cell: Cell) -> dict[str, float]:
-        """Those of the cell's framing, moved a little by its other levels."""
+        """Those of the cell's framing, moved a little by its other levels, JOD."""
         published = PUBLISHED_PRIORITIES.get(cell.framing, {})
         logs = {name: math.log(priority) for name, priority in published.items()}
         centre = sum(logs.values()) / len(logs) if logs else 0.0
         worths = {}
         for name in study.techniques:
             if name in logs:
-                worths[name] = logs[name] - centre
+                worths[name] = GAIN_JOD * (logs[name] - centre)
             else:
-                worths[name] = self._random(cell.framing, name).gauss(0, UNKNOWN_SPREAD)
+                worths[name] = self._random(cell.framing, name).gauss(0, UNKNOWN_SPREAD_JOD)
             if len(cell.levels) > 1:
-                worths[name] += self._random(cell.name, name).gauss(0, LEVEL_SPREAD)
+                worths[name] += self._random(cell.name, name).gauss(0, LEVEL_SPREAD_JOD)
         return worths
 
     def _random(self, *key: object) -> Random:

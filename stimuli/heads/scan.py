@@ -5,17 +5,16 @@ What is asked of a file, for shading and occlusion to be right:
 
 * Finite positions, triangles (polygons are fanned) with an area, at least one.
 * A surface: no edge with more than two faces. Vertices count as one where they lie at exactly one
-place, so seams of the
-  texture do not matter; open borders are fine, scans have them. Real scans also have a few bad
-  edges. At each of them the smooth normal mixes sheets that face apart, a flaw the size of a
-  triangle; the file is refused when more than `NON_MANIFOLD_LIMIT` of all edges are bad, else they
-  are told of. The same holds for neighbouring faces that disagree about which side is out, unless
-  the file has normals. Hair and films over the eye, by their names, are cards and exempt.
+  place, so seams of the texture do not matter; open borders are fine, scans have them. Real scans
+  also have a few bad edges. At each of them the smooth normal mixes sheets that face apart, a flaw
+  the size of a triangle; the file is refused when more than `NON_MANIFOLD_LIMIT` of all edges are
+  bad, else they are told of. The same holds for neighbouring faces that disagree about which side
+  is out, unless the file has normals. Hair and films over the eye, by their names, are cards and
+  exempt.
 * The size of a head, in a unit that is given, that the format lays down (glTF: metres), or that
-makes the size plausible.
+  makes the size plausible.
 * Y up, the face towards +z, as glTF lays down; a file with z up (the face towards -y) is turned.
-For OBJ, which does not say,
-  the longer of the two is taken as the height.
+  For OBJ, which does not say, the longer of the two is taken as the height.
 """
 
 import os

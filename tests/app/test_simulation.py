@@ -2,6 +2,7 @@
 
 import csv
 
+import numpy as np
 import pytest
 from sqlalchemy import func, select
 
@@ -10,7 +11,7 @@ from app.cli import main
 from app.models import Participant, Response
 from app.server import running
 from app.simulation.client import Visitor
-from app.simulation.people import PUBLISHED_PRIORITIES, Crowd
+from app.simulation.people import ANSWERING, GAIN_JOD, PUBLISHED_PRIORITIES, Crowd
 from app.study import Study
 
 VARYING = {"started_at", "answered_at"}
@@ -136,6 +137,28 @@ def test_answers_follow_the_published_findings(study_dir):
     totals = [sum(points[framing].values()) for framing in study.framings]
     assert totals[0] > 1.3 * totals[1] > 1.3 * totals[2]
     assert abs(sum(sides)) < 0.03 * len(sides)
+
+
+def test_answers_are_those_of_the_model_that_power_plans_with(study_dir):
+    """4,000 people about one pair: shares of the five answers are those of the model, to 3 standard
+    errors of a share, 3 sqrt(p (1 - p)/4000) < 0.024.
+    """
+    study = Study.open(study_dir)
+    crowd = Crowd(study, 3)
+    given = [crowd.answer(n, 1, "close-up", "none", "jimenez_gaussian")[0] for n in range(4000)]
+    log = {name: np.log(PUBLISHED_PRIORITIES["close-up"][name]) for name in study.techniques}
+    difference = GAIN_JOD * (log["jimenez_gaussian"] - log["none"])
+    shares = [given.count(answer) / len(given) for answer in range(-2, 3)]
+    assert shares == pytest.approx(list(ANSWERING.shares(difference)), abs=0.024)
+
+
+def test_a_rating_has_the_levels_of_the_study(tmp_path, write_study):
+    rating = {"question": "?", "labels": ["never", "daily"], "levels": [0, 7]}
+    study = write_study(tmp_path / "rated", familiarity=rating)
+    assert simulate(study, "--participants", 4) == 0
+    assert {row["familiarity"] for row in rows(study)} <= {"0", "7"}
+    book = (study / "simulated" / "codebook.md").read_text()
+    assert "- familiarity 0: never" in book and "- familiarity 7: daily" in book
 
 
 def test_published_priorities_sum_to_one():
