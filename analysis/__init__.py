@@ -16,6 +16,15 @@ The public face (numpy, pandas and scipy, no matplotlib):
     results = everything(responses, Options(seed=1, margin=0.5))
     results.tables["worths"], results.notes["worths"]  # numbers; what was refused and why
 
+    # single statistics, of plain numbers
+    bradley_terry(wins), standard_errors(wins)  # worths of a win matrix, their errors
+    davidson(wins, ties), davidson_sides(counts)  # with ties; with ties and a side
+    thurstone_jod(wins, reduced_bias=True)  # JOD, also where a technique never won
+    circular_triads(preferred), triad_distribution(5)  # of one person; of guessing
+    holm(p), signed_rank(values), sign_test(values), equivalence(values, margin)
+    kendall_u(counts), krippendorff_alpha(counts, "interval")
+    t_power(0.5, 34), tost_power(0.0, 0.5, 40), sign_power(0.6, 0.2, 30)
+
 `responses_from_records` takes mappings instead of a file. Errors of the user's making are
 `InputError`. Figures and the report live in `analysis.figures` and `analysis.report`, which load
 matplotlib. Names resolve on first use, so that `analysis.manifest`, `analysis.options` and
@@ -29,6 +38,13 @@ import importlib
 _WHERE = {
     name: module
     for module, names in {
+        "analysis.agreement": (
+            "circular_triads",
+            "kendall_u",
+            "krippendorff_alpha",
+            "triad_distribution",
+            "zeta",
+        ),
         "analysis.ahp": (
             "Comparison",
             "Priorities",
@@ -41,7 +57,9 @@ _WHERE = {
         "analysis.codebook": ("Codebook", "read_manifest"),
         "analysis.compute": ("Results", "everything"),
         "analysis.errors": ("InputError",),
+        "analysis.inference": ("equivalence", "holm", "sign_test", "signed_rank"),
         "analysis.options": ("Exclusions", "Options"),
+        "analysis.planning.closed_form": ("sign_power", "t_power", "tost_power"),
         "analysis.responses": (
             "Finding",
             "Responses",
@@ -56,6 +74,13 @@ _WHERE = {
             "sides",
             "totals",
             "trend",
+        ),
+        "analysis.worth": (
+            "bradley_terry",
+            "davidson",
+            "davidson_sides",
+            "standard_errors",
+            "thurstone_jod",
         ),
     }.items()
     for name in names

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import combinations
+from functools import lru_cache
+from itertools import combinations, product
 from math import comb
 
 import numpy as np
@@ -25,6 +26,7 @@ from scipy import stats
 
 from analysis import bootstrap, inference, worth
 from analysis.codebook import FRAMING, Codebook
+from analysis.errors import InputError
 from analysis.options import FEWEST_PEOPLE, OVERALL, Exclusions, Options
 from analysis.panel import Panel, by_pair, panels, with_notes
 from analysis.responses import Responses
@@ -46,6 +48,8 @@ PARTICIPANTS = (
 #: Chance with which a one-sided person must be incompatible before `Exclusions.one_side_share`
 #: applies.
 ONE_SIDE_P = 0.001
+#: To so many items the distribution of circular triads is exact.
+MOST_EXACT_ITEMS = 10
 #: What a person must have given before a rule can say anything of them: rule -> (how many, of
 #: what). `one_side_share` needs eleven decided answers by its p alone.
 ENOUGH = {
@@ -60,8 +64,9 @@ def agreement(responses: Responses, options: Options) -> pd.DataFrame:
     """framing, statistic, value, low, high, p; for each framing and 'overall':
 
     circular_triads             mean a participant, of those who answered every pair; p: fewer than
-                                by guessing, one-sided, normal approximation with the exact mean 1/4
-                                and variance 3/16 of a decided triad (Moran 1947)
+                                by guessing, one-sided: exact where no answer is a tie and there are
+                                at most ten techniques, else a normal approximation with the exact
+                                mean 1/4 and variance 3/16 of a decided triad (Moran 1947)
     zeta                        mean coefficient of consistency, at most 1
     circular_triads_guessed, zeta_guessed   the same with ties settled by a fair coin
     pooled_circular_triads, pooled_zeta     of the majority: whom more answers prefer; not for
@@ -394,6 +399,54 @@ def zeta(circular: np.ndarray, n: int) -> np.ndarray:
     return 1 - np.asarray(circular) / ((n**3 - n) / 24 if n % 2 else (n**3 - 4 * n) / 24)
 
 
+def circular_triads(preferred: np.ndarray) -> int:
+    """preferred (n, n): above 0 where i was preferred to j by one person, 0 where neither or never
+    asked -> how many triads go in a circle.
+    """
+    sign = np.sign(np.asarray(preferred, float))
+    sign = np.sign(sign - sign.T)
+    return sum(
+        int(abs(sign[i, j] + sign[j, k] + sign[k, i]) == 3)
+        for i, j, k in combinations(range(len(sign)), 3)
+    )
+
+
+@lru_cache(maxsize=16)
+def triad_distribution(n: int) -> np.ndarray:
+    """(d_max + 1,): the chance of 0, 1, ... circular triads when every answer about n items is
+    settled by a fair coin, exact, for 3 to 10 items.
+
+    By adding one item after another to the sorted scores (how often each item is preferred): d =
+    C(n, 3) - sum of C(score, 2). Kendall and Babington Smith 1940, table I.
+    """
+    if not 3 <= n <= MOST_EXACT_ITEMS:
+        raise InputError(f"n is {n}, expected 3 to {MOST_EXACT_ITEMS} items")
+    states = {(0,): 1.0}
+    for size in range(1, n):
+        grown: dict[tuple[int, ...], float] = {}
+        for scores, weight in states.items():
+            for won in product((0, 1), repeat=size):  # whom the new item beats
+                new = [score + 1 - one for score, one in zip(scores, won, strict=True)]
+                key = tuple(sorted((*new, sum(won))))
+                grown[key] = grown.get(key, 0.0) + weight
+        states = grown
+    chance = np.zeros(round((n**3 - n) / 24 if n % 2 else (n**3 - 4 * n) / 24) + 1)
+    for scores, weight in states.items():
+        chance[comb(n, 3) - sum(comb(score, 2) for score in scores)] += weight
+    return chance / chance.sum()
+
+
+def few_triads(circular: int, people: int, n: int) -> float:
+    """p of so few circular triads among so many people when all guess and no answer is a tie: the
+    exact distribution of `triad_distribution`, people added up.
+    """
+    one = triad_distribution(n)
+    size = people * (len(one) - 1) + 1
+    padded = np.fft.rfft(one, 1 << (size - 1).bit_length())
+    whole = np.clip(np.fft.irfft(padded**people)[:size], 0, None)
+    return float(min(1.0, whole[: circular + 1].sum() / whole.sum()))
+
+
 def _consistency(
     name: str, parts: tuple[Panel, ...], options: Options, notes: list[str]
 ) -> list[tuple]:
@@ -422,11 +475,16 @@ def _consistency(
     values = sums[people]
     draws = bootstrap.totals(values, options) / len(values)
     low, high = bootstrap.interval(draws, len(values), options.level)
-    p = (
-        float(stats.norm.cdf((seen - decided / 4) / np.sqrt(3 * decided / 16)))
-        if decided
-        else np.nan
+    p = np.nan
+    sizes = {len(panel.items) for panel, here in zip(parts, full, strict=True) if here.any()}
+    triples = sum(
+        comb(len(panel.items), 3) * int(here.sum()) for panel, here in zip(parts, full, strict=True)
     )
+    if decided == triples and len(sizes) == 1 and max(sizes) <= MOST_EXACT_ITEMS:
+        asked = sum(int(here.sum()) for here in full)
+        p = few_triads(int(seen), asked, max(sizes))
+    elif decided:
+        p = float(stats.norm.cdf((seen - decided / 4) / np.sqrt(3 * decided / 16)))
     return [
         (label, values[:, k].mean(), low[k], high[k], p if label == "circular_triads" else np.nan)
         for k, label in enumerate(labels)
@@ -492,25 +550,44 @@ def kendall_test(counts: np.ndarray, items: int) -> tuple[float, float, float]:
     return float(chi2), float(df), float(stats.chi2.sf(chi2, df))
 
 
-def krippendorff_alpha(counts: np.ndarray) -> np.ndarray:
-    """counts (..., K, 5), answers of each value to each unit -> (...): ordinal alpha; NaN where all
-    answers are alike.
+def krippendorff_alpha(
+    counts: np.ndarray, metric: str = "ordinal", values: np.ndarray | None = None
+) -> np.ndarray:
+    """counts (..., K, C), answers of each of C values to each of K units -> (...): alpha; NaN where
+    all answers are alike.
+
+    metric: 'nominal', 'ordinal' (the values ascend) or 'interval' (of `values`, 0, 1, ... without
+    them). Krippendorff 2013, "Content Analysis", 3rd ed., section 12.3.
     """
+    counts = np.asarray(counts, float)
+    size = counts.shape[-1]
     n = counts.sum(axis=-1)
     weight = np.divide(1.0, n - 1, out=np.zeros(n.shape), where=n > 1)
     pairs = np.einsum("...kc,...kd,...k->...cd", counts, counts, weight, optimize=True)
-    pairs[..., range(5), range(5)] -= np.einsum("...kc,...k->...c", counts, weight)
+    pairs[..., range(size), range(size)] -= np.einsum("...kc,...k->...c", counts, weight)
     totals = pairs.sum(axis=-1)
-    below = (
-        np.cumsum(totals, axis=-1) - totals / 2
-    )  # mid-ranks: the sum from c to d, less half of each end, is their difference
-    distance = (below[..., :, None] - below[..., None, :]) ** 2
+    distance = _distance(totals, metric, values)
     observed = (pairs * distance).sum(axis=(-2, -1))
     expected = (totals[..., :, None] * totals[..., None, :] * distance).sum(axis=(-2, -1))
-    size = totals.sum(axis=-1)
-    return 1 - (size - 1) * np.divide(
+    whole = totals.sum(axis=-1)
+    return 1 - (whole - 1) * np.divide(
         observed, expected, out=np.full(observed.shape, np.nan), where=expected > 0
     )
+
+
+def _distance(totals: np.ndarray, metric: str, values: np.ndarray | None) -> np.ndarray:
+    """(..., C, C): squared differences of the values in a metric."""
+    size = totals.shape[-1]
+    if metric == "nominal":
+        return 1.0 - np.eye(size)
+    if metric == "interval":
+        place = np.arange(size, dtype=float) if values is None else np.asarray(values, float)
+        return (place[:, None] - place) ** 2
+    if metric != "ordinal":
+        raise InputError(f"metric is {metric!r}, expected one of nominal, ordinal, interval")
+    # mid-ranks: the sum from c to d, less half of each end, is their difference
+    below = np.cumsum(totals, axis=-1) - totals / 2
+    return (below[..., :, None] - below[..., None, :]) ** 2
 
 
 def _concordance(name: str, panel: Panel, options: Options, notes: list[str]) -> list[tuple]:

@@ -257,8 +257,11 @@ def priority_intervals(responses: Responses, options: Options) -> pd.DataFrame:
 
 
 def consistency_intervals(responses: Responses, options: Options) -> pd.DataFrame:
-    """framing, aggregation, ci, ci_low, ci_high, cr, cr_low, cr_high, a, b, judgement, consistent.
+    """framing, aggregation, ci, ci_low, ci_high, cr, cr_low, cr_high, a, b, judgement, consistent,
+    chance_cr, chance_share.
 
+    chance_cr, chance_share: the median CR of studies of the same design and strengths whose
+    directions are settled by a coin, and the share of them whose CR is as low; see `chance`.
     a, b, judgement, consistent: where CR is at least 0.1, the judgement to look at again and what
     the others imply; else empty. cr is empty beyond 10 techniques, where there is no random index.
     """
@@ -275,6 +278,8 @@ def consistency_intervals(responses: Responses, options: Options) -> pd.DataFram
         "b",
         "judgement",
         "consistent",
+        "chance_cr",
+        "chance_share",
     ]
     rows, notes = [], bootstrap.few(responses)
     for name, panel in panels(responses).items():
@@ -285,11 +290,18 @@ def consistency_intervals(responses: Responses, options: Options) -> pd.DataFram
                 f"{name}: no consistency ratio: there is no random index beyond "
                 f"{len(RANDOM_INDEX)} items, got {n}"
             )
+        by_chance = chance(panel, options)
         for aggregation in AGGREGATIONS:
             matrix, drawn = _matrices(panel, aggregation, options)
             ci = _index(matrix)
             bounds = bootstrap.interval(_index(drawn), panel.people, options.level)
             ratio = [float(one) / index if index else float(one) for one in (ci, *bounds)]
+            drawn_ratio = _index(aggregated(panel, by_chance, aggregation)) / (index or 1.0)
+            known = np.isfinite(drawn_ratio)
+            random_cr = share = np.nan
+            if n > 2 and known.any() and np.isfinite(ratio[0]):
+                random_cr = float(np.median(drawn_ratio[known]))
+                share = float((drawn_ratio[known] <= ratio[0] + 1e-12).mean())
             again = look_again(Comparison(panel.items, matrix)) if ratio[0] >= 0.1 else None
             rows.append(
                 (
@@ -299,9 +311,29 @@ def consistency_intervals(responses: Responses, options: Options) -> pd.DataFram
                     *map(float, bounds),
                     *ratio,
                     *(again or ("", "", np.nan, np.nan)),
+                    random_cr,
+                    share,
                 )
             )
     return with_notes(rows, columns, notes)
+
+
+def chance(panel: Panel, options: Options) -> np.ndarray:
+    """(resamples, K, 5): the panel's counts with the direction of every answer settled by a fair
+    coin and its strength kept: studies of the same design in which nothing is preferred.
+
+    On a scale that stops at 3 the medians of many such people lie near 1 and look coherent, so that
+    a low CR alone says little.
+    """
+    counts = panel.counts.astype(int)
+    rng = np.random.default_rng([options.seed, 21])
+    drawn = np.zeros((options.resamples, *counts.shape))
+    drawn[..., 2] = counts[:, 2]
+    for low, high in ((1, 3), (0, 4)):
+        total = counts[:, low] + counts[:, high]
+        drawn[..., low] = rng.binomial(total, 0.5, (options.resamples, len(total)))
+        drawn[..., high] = total - drawn[..., low]
+    return drawn
 
 
 def _matrices(panel: Panel, aggregation: str, options: Options) -> tuple[np.ndarray, np.ndarray]:

@@ -22,8 +22,10 @@ what the levels hold, under the name 'all'.
     pair_medians    framing,a,b,n,median_preference,low,high
     ahp_intervals   framing,aggregation,method,technique,priority,low,high
                     aggregation median|geometric_mean, method eigenvector|row_geometric_mean
-    ahp_consistency framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,judgement,consistent
-                    a,b: the judgement to look at again, 'consistent' what the others imply
+    ahp_consistency framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,
+                    judgement,consistent,chance_cr,chance_share
+                    a,b: the judgement to look at again, 'consistent' what the others imply;
+                    chance_cr, chance_share: where the CR lies among studies settled by a coin
     worths          framing,model,technique,estimate,low,high,fit
                     centred on 0 within a framing; fit: 'maximum likelihood', or what stands in
     worth_models    framing,model,parameter,estimate,low,high
@@ -42,6 +44,8 @@ what the levels hold, under the name 'all'.
                     any difference, additivity, interaction of technique and framing
     trend           statistic,value,low,high,p
                     preference against distance
+    by_images       a,b,images,mean_preference,low,high,p,holm_p,least,most
+                    kinds of images as a sample
     order_effects   statistic,people,value,low,high,p
                     fatigue, and what the question before does
     agreement       framing,statistic,value,low,high,p
@@ -62,7 +66,7 @@ what the levels hold, under the name 'all'.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -83,31 +87,41 @@ class Results:
     options: Options
 
 
-def everything(responses: Responses, options: Options | None = None) -> Results:
+#: Table -> what makes it, in the order of the report.
+TABLES = {
+    "tallies": bootstrap.score_intervals,
+    "pair_medians": bootstrap.median_intervals,
+    "ahp_intervals": ahp.priority_intervals,
+    "ahp_consistency": ahp.consistency_intervals,
+    "worths": worth.worths,
+    "worth_models": worth.parameters,
+    "goodness": worth.goodness,
+    "pairs": inference.pairs,
+    "contrasts": inference.contrasts,
+    "omnibus": inference.omnibus,
+    "by_images": inference.by_images,
+    "trend": inference.trend,
+    "order_effects": inference.order_effects,
+    "agreement": agreement.agreement,
+    "side_balance": agreement.side_balance,
+    "participants": agreement.participants,
+    "sensitivity": agreement.sensitivity,
+    "familiarity_interaction": inference.familiarity_interaction,
+}
+
+
+def everything(
+    responses: Responses,
+    options: Options | None = None,
+    progress: Callable[[Iterable], Iterable] = lambda steps: steps,
+) -> Results:
     """All tables of this module's docstring.
 
-    Deterministic: the same answers and options give the same bytes.
+    Deterministic: the same answers and options give the same bytes. progress wraps the list of
+    tables, as tqdm does.
     """
     options = options or Options()
-    tables = {
-        "tallies": bootstrap.score_intervals(responses, options),
-        "pair_medians": bootstrap.median_intervals(responses, options),
-        "ahp_intervals": ahp.priority_intervals(responses, options),
-        "ahp_consistency": ahp.consistency_intervals(responses, options),
-        "worths": worth.worths(responses, options),
-        "worth_models": worth.parameters(responses, options),
-        "goodness": worth.goodness(responses, options),
-        "pairs": inference.pairs(responses, options),
-        "contrasts": inference.contrasts(responses, options),
-        "omnibus": inference.omnibus(responses, options),
-        "trend": inference.trend(responses, options),
-        "order_effects": inference.order_effects(responses, options),
-        "agreement": agreement.agreement(responses, options),
-        "side_balance": agreement.side_balance(responses, options),
-        "participants": agreement.participants(responses, options),
-        "sensitivity": agreement.sensitivity(responses, options),
-        "familiarity_interaction": inference.familiarity_interaction(responses, options),
-    }
+    tables = {name: TABLES[name](responses, options) for name in progress(list(TABLES))}
     notes = {name: table.attrs.get("notes", ()) for name, table in tables.items()}
     lines = [("all", line) for line in responses.grouping] + [
         (name, line) for name, said in notes.items() for line in said

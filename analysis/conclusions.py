@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from analysis.codebook import Codebook
+from analysis.codebook import FRAMING, Codebook
 from analysis.inference import alpha_of, verdict
 from analysis.options import OVERALL, Options
 from analysis.shown import number, probability
@@ -65,6 +65,7 @@ def conclude(
         )
     _about_trend(found, tables["trend"], codebook, alpha)
     _about_order(found, tables, alpha)
+    _about_images(found, tables, codebook, alpha)
     _about_agreement(found, tables["agreement"], codebook, alpha, who.capitalize())
     _about_sides(found, tables, notes, codebook, alpha, who.capitalize())
     _about_familiarity(found, tables["familiarity_interaction"], codebook, alpha)
@@ -75,8 +76,7 @@ def conclude(
         "Nothing here says how people judge, since a program answered."
         if simulated
         else "These answers speak for people like those asked, on displays like theirs, and "
-        "for these images of this head; "
-        "for other ones they are a guess."
+        f"{_images(codebook)}; for other ones they are a guess."
     )
     return found
 
@@ -344,6 +344,41 @@ def _about_order(found: Conclusions, tables: Mapping[str, pd.DataFrame], alpha: 
         )
 
 
+def _images(codebook: Codebook) -> str:
+    """For which images answers speak: what was varied, and that the rest was not."""
+    varied = [name.replace("_", " ") for name in codebook.factors]
+    if len(codebook.framings) > 1 and codebook.factor == FRAMING:
+        varied = ["framing", *varied]
+    if not varied:
+        return "for these images alone, of which nothing but the technique was varied"
+    return (
+        f"for the images that were shown, in which the technique and {listed(varied)} were "
+        "varied and nothing else was"
+    )
+
+
+def _about_images(
+    found: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook, alpha: float
+) -> None:
+    """Whether differences hold beyond the images that were shown."""
+    table = tables.get("by_images")
+    if table is None or table.empty:
+        return
+    hold = [row for row in table.itertuples() if row.holm_p <= alpha]
+    images = int(table.images.max())
+    if hold:
+        found.can.append(
+            f"Taking the {images} kinds of images as a sample of others (t test over them, after "
+            f"Holm's correction), differences hold beyond them for {_pairs(hold, codebook)}."
+        )
+    else:
+        found.cannot.append(
+            f"Whether differences hold for other images than these {images} kinds: taking them as "
+            "a sample, no pair's difference does after Holm's correction; the intervals and tests "
+            "of pairs take the images as they are."
+        )
+
+
 def _about_spread(
     found: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook
 ) -> None:
@@ -443,7 +478,7 @@ def _about_sides(
     for framing, _, reason in confounded:
         found.cannot.append(
             f"{framing_label(codebook, framing)}: what is preferred and which side is preferred "
-            f"cannot be told apart: {_with_labels(reason, codebook)}."
+            f"cannot be told apart: {with_labels(reason, codebook)}."
         )
     if len(leaning):
         words = listed(
@@ -565,17 +600,17 @@ def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) 
     for (framing, reason), names in refused.items():
         found.cannot.append(
             f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: "
-            f"{_with_labels(reason, codebook)}."
+            f"{with_labels(reason, codebook)}."
         )
     for (framing, reason), names in replaced.items():
         found.cannot.append(
             f"{framing_label(codebook, framing)}: how far apart techniques are by {listed(names)} "
-            f"is open on one side: {_with_labels(reason, codebook)}, so that maximum likelihood "
+            f"is open on one side: {with_labels(reason, codebook)}, so that maximum likelihood "
             "has no finite worths; fits with reduced bias or weak priors stand in and are marked."
         )
 
 
-def _with_labels(text: str, codebook: Codebook) -> str:
+def with_labels(text: str, codebook: Codebook) -> str:
     """The text with techniques' labels for their names."""
     labels = {name: codebook.label(name) for name in codebook.techniques}
     names = re.compile(

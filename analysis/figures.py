@@ -10,7 +10,7 @@ import io
 import textwrap
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import matplotlib
 import numpy as np
@@ -42,6 +42,12 @@ ON_ANSWERS = ("white", INK, INK, INK, "white")
 SINGLE_MM, DOUBLE_MM = 84.7, 177.8
 WIDTH_IN, NARROW_IN = DOUBLE_MM / 25.4, SINGLE_MM / 25.4
 BANNER_IN = 0.26
+#: No figure is taller than this, without the banner: an A4 page with margins and a caption.
+TALLEST_IN = 8.2
+#: Up to so many techniques each one's answers against each other one are drawn.
+MOST_PREFERENCES = 12
+#: From so many rows on a label has one line.
+MANY_ROWS = 16
 RC = {
     "font.family": "DejaVu Sans",
     "font.size": 8,
@@ -71,7 +77,7 @@ RC = {
 @dataclass(frozen=True)
 class Picture:
     """A figure as bytes; `name` is its file name without suffix, `alt` what it shows, for those who
-    cannot see it.
+    cannot see it. kind: the name that the pages of one figure share.
     """
 
     name: str
@@ -81,6 +87,7 @@ class Picture:
     svg: bytes
     png: bytes
     pdf: bytes
+    kind: str = ""
 
     @property
     def files(self) -> dict[str, bytes]:
@@ -133,6 +140,47 @@ def _picture(
     return Picture(name, title, caption, alt, svg.getvalue(), png.getvalue(), pdf.getvalue())
 
 
+def _paged(
+    name: str,
+    title: str,
+    caption: str,
+    chunks: Sequence[object],
+    alt: Callable[[object], str],
+    draw: Callable[..., Figure],
+    *args: object,
+    simulated: bool = False,
+) -> list[Picture]:
+    """A figure of several pages, one for each chunk, which `draw` gets first."""
+    pictures = []
+    for place, chunk in enumerate(chunks, start=1):
+        one = len(chunks) == 1
+        picture = _picture(
+            name if place == 1 else f"{name}_{place}",
+            title if one else f"{title} ({place} of {len(chunks)})",
+            caption,
+            alt(chunk),
+            draw,
+            chunk,
+            *args,
+            simulated=simulated,
+        )
+        pictures.append(replace(picture, kind=name))
+    return pictures
+
+
+def _chunks(values: Sequence, most: int) -> list[list]:
+    """The values in runs of about the same length, of at most so many."""
+    values, most = list(values), max(1, most)
+    count = max(1, -(-len(values) // most))
+    size = -(-len(values) // count)
+    return [values[start : start + size] for start in range(0, len(values), max(1, size))]
+
+
+def _rows_that_fit(height_in: float, below_in: float = 0.0) -> int:
+    """How many rows of panels of that height a page takes."""
+    return max(1, int((TALLEST_IN - below_in) / height_in))
+
+
 def _mark(figure: Figure) -> None:
     """A strip across the top, in room added for it, that says that no person gave these answers."""
     width, height = figure.get_size_inches()
@@ -173,22 +221,35 @@ def _panels(
 
 
 def _cut(label: str, width: int) -> str:
-    return label if len(label) <= width else f"{label[: width - 1].rstrip()}…"
+    """The label in so many letters: its beginning and its end, which tells one from another."""
+    if len(label) <= width:
+        return label
+    end = (width - 1) // 2
+    return f"{label[: width - 1 - end].rstrip()}…{label[-end:].lstrip()}" if end else label[:width]
 
 
 def _wrapped(label: str, width: int = 20, most: int = 2) -> str:
     """The label on at most so many lines."""
     lines = textwrap.wrap(label.replace("_", "_\u200b"), width, break_long_words=True) or [label]
     lines = [line.replace("\u200b", "") for line in lines]
-    return "\n".join(lines[:most]) + ("…" if len(lines) > most else "")
+    if len(lines) > most:
+        return _wrapped(_cut(label, most * width - most), width, most + 1)
+    return "\n".join(lines)
 
 
 def _row_in(labels: Sequence[str]) -> float:
     """The height in inches that a row needs for the tallest of its wrapped labels."""
-    return 0.25 if all("\n" not in label for label in labels) else 0.32
+    row = 0.25 if all("\n" not in label for label in labels) else 0.32
+    return min(row, (TALLEST_IN - 1.2) / max(len(labels), 1))
+
+
+def _row_labels(names: Sequence[str], width: int = 20) -> list[str]:
+    """Labels of rows: wrapped, or cut to one line where there are many."""
+    return [_wrapped(name, width) if len(names) <= MANY_ROWS else _cut(name, 24) for name in names]
 
 
 def _bars(
+    chosen: Sequence[str],
     values: Mapping[str, Mapping[str, float]],
     titles: Mapping[str, tuple[str, str]],
     labels: Mapping[str, str],
@@ -198,12 +259,12 @@ def _bars(
     """One panel a framing, one bar a technique; a technique without a value there gets no bar and
     says so.
     """
-    rows = [_wrapped(label) for label in labels.values()]
-    figure, panels = _panels(
-        len(values), 3, 0.5 + _row_in(rows) * len(rows), below_in=0.3, sharex=True, sharey=True
-    )
+    rows = _row_labels(list(labels.values()))
+    height = _bars_in(labels)
+    figure, panels = _panels(len(chosen), 3, height, below_in=0.3, sharex=True, sharey=True)
     top = max((value for one in values.values() for value in one.values()), default=0) or 1
-    for ax, (framing, one) in zip(panels, values.items(), strict=True):
+    for ax, framing in zip(panels, chosen, strict=True):
+        one = values[framing]
         for place, technique in enumerate(labels):
             value = one.get(technique)
             if value is None:
@@ -212,7 +273,7 @@ def _bars(
                 ax.barh(place, value, height=0.66, color=BLUE)
                 _value(ax, value, place, f"{value:.{digits}f}")
         label, note = titles[framing]
-        ax.set_title(f"{_cut(label, 14)} ({note})", loc="left")
+        ax.set_title(f"{_wrapped(label, 26)}\n({note})", loc="left", size=8)
         ax.set_xlim(0, top * 1.25)
         ax.xaxis.set_major_locator(MaxNLocator(4, integer=digits == 0))
         ax.grid(axis="x")
@@ -221,6 +282,12 @@ def _bars(
         ax.tick_params(labelbottom=True)
     figure.supxlabel(axis, size=8)
     return figure
+
+
+def _bars_in(labels: Mapping[str, str]) -> float:
+    """The height of one panel of `_bars`."""
+    rows = _row_labels(list(labels.values()))
+    return 0.68 + _row_in(rows) * len(rows)
 
 
 def _value(ax: Axes, x: float, y: float, text: str) -> None:
@@ -255,7 +322,8 @@ def _familiarity(table: pd.DataFrame) -> Figure:
 def _total_by_distance(
     table: pd.DataFrame, labels: Sequence[str], axis: str, line: tallies.Trend | None
 ) -> Figure:
-    figure, (ax,) = _panels(1, 1, 2.7, NARROW_IN)
+    many = len(table) > 5
+    figure, (ax,) = _panels(1, 1, 3.0 if many else 2.7, WIDTH_IN if many else NARROW_IN)
     distance = np.arange(1, len(table) + 1)
     if line is not None:
         ends = np.array([0.75, len(table) + 0.25])
@@ -278,9 +346,13 @@ def _total_by_distance(
             "va": "top" if below else "bottom",
         }
         ax.annotate(f"{total}", (x, total), ha="center", size=7.5, **place)
-    ax.set_xticks(
-        distance, [_wrapped(label, max(6, min(14, 40 // len(labels)))) for label in labels]
-    )
+    if many:
+        turned = {"rotation": 35, "ha": "right", "rotation_mode": "anchor", "size": 7}
+        ax.set_xticks(distance, [_cut(label, 24) for label in labels], **turned)
+    else:
+        ax.set_xticks(
+            distance, [_wrapped(label, max(6, min(14, 40 // len(labels)))) for label in labels]
+        )
     ax.set_xlim(0.6, len(table) + 0.4)
     ax.set_ylim(0, max(table.total.max(), 1) * 1.18)
     ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
@@ -291,19 +363,18 @@ def _total_by_distance(
     return figure
 
 
-def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
-    """One panel a technique, one bar an opponent;
-    the answers 'no difference' straddle the middle.
+def _preferences(techniques: list[str], table: pd.DataFrame, codebook: Codebook) -> Figure:
+    """One panel for each of the techniques, one bar an opponent; the answers 'no difference'
+    straddle the middle.
     """
-    techniques = list(dict.fromkeys(table.technique))
     shares = 100 * table[list(tallies.DISTRIBUTION)].to_numpy() / table.n.to_numpy()[:, None]
     starts = -(shares[:, 0] + shares[:, 1] + shares[:, 2] / 2)
-    opponents = {name: _wrapped(codebook.label(name)) for name in techniques}
+    opponents = {name: _wrapped(codebook.label(name), 15) for name in dict.fromkeys(table.opponent)}
     most = table.groupby("technique").size().max()
     figure, panels = _panels(
         len(techniques),
-        2,
-        0.5 + _row_in(list(opponents.values())) * most,
+        3,
+        0.42 + _row_in(list(opponents.values())) * most,
         below_in=0.5,
         sharex=True,
     )
@@ -320,33 +391,34 @@ def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
             }
             ax.barh(range(len(about)), share[:, answer], left=left, **style)
             for place, count in enumerate(about[column]):
-                # a digit of 6.5 points needs about 4 % of a panel's width
-                if share[place, answer] >= 4 * len(str(count)):
+                # a digit of 7 points needs about 6 % of a panel's width
+                if share[place, answer] >= 6 * len(str(count)):
                     middle = left[place] + share[place, answer] / 2
                     ax.text(
                         middle,
                         place,
                         f"{count}",
-                        size=6.5,
+                        size=7,
                         color=ON_ANSWERS[answer],
                         ha="center",
                         va="center_baseline",
                     )
             left = left + share[:, answer]
         ax.axvline(0, color=INK, linewidth=0.7, zorder=0)
-        ax.set_title(_cut(codebook.label(technique), 30), loc="left")
+        ax.set_title(_cut(codebook.label(technique), 26), loc="left", size=8)
         ax.set_yticks(range(len(about)), [opponents[name] for name in about.opponent])
         ax.set_ylim(len(about) - 0.5, -0.5)
         ax.set_xlim(-100, 100)
         ax.xaxis.set_major_locator(MultipleLocator(50))
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{abs(share):g} %"))
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{abs(share):g}"))
+        ax.tick_params(labelsize=7)
         ax.tick_params(labelbottom=True)
     keys = [Rectangle((0, 0), 1, 1, facecolor=colour) for colour in ANSWERS]
     figure.legend(
         keys,
         ("strong", "slight", "no difference", "slight", "strong"),
         title=(
-            "←  the panel's technique is preferred      share of answers      the row's "
+            "←  the panel's technique is preferred      share of answers, %      the row's "
             "technique is preferred  →"
         ),
         title_fontsize=8,
@@ -358,17 +430,41 @@ def _preferences(table: pd.DataFrame, codebook: Codebook) -> Figure:
     return figure
 
 
-def _pair(values: Mapping[str, np.ndarray], pair: tuple[str, str], codebook: Codebook) -> Figure:
+def grouped_quantiles(answers: np.ndarray, shares: Sequence[float]) -> np.ndarray:
+    """Quantiles of grouped answers: each of the five stands for an interval of width 1 about it,
+    over which those who gave it are spread evenly, so that half of them lie to either side.
+    """
+    edges = np.arange(-2.5, 3.0)
+    below = np.concatenate([[0], np.cumsum([(answers == value).sum() for value in range(-2, 3)])])
+    rising = below + 1e-9 * np.arange(len(below))  # np.interp wants places that ascend
+    at = np.asarray(shares) * len(answers)
+    # the middle of an answer that nobody gave between two that share the people evenly
+    lower, upper = (np.interp(at + step, rising, edges) for step in (-1e-6, 1e-6))
+    return np.clip((lower + upper) / 2, -2, 2)
+
+
+def _pair(
+    chosen: Sequence[str],
+    values: Mapping[str, np.ndarray],
+    pair: tuple[str, str],
+    codebook: Codebook,
+) -> Figure:
     """Box plot of one pair at each framing over all its points; whiskers reach the extremes."""
+    values = {name: values[name] for name in chosen}
     figure, (ax,) = _panels(1, 1, 1.15 + 0.62 * len(values), NARROW_IN)
     places = range(len(values))
     ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
-    ax.boxplot(
-        list(values.values()),
+    boxes = []
+    for answers in values.values():
+        q1, median, q3 = grouped_quantiles(answers, (0.25, 0.5, 0.75))
+        ends = {"whislo": min(answers.min(), q1), "whishi": max(answers.max(), q3)}
+        boxes.append({"q1": q1, "med": median, "q3": q3, "fliers": [], **ends})
+    ax.bxp(
+        boxes,
         orientation="horizontal",
         positions=places,
         widths=0.62,
-        whis=(0, 100),
+        showfliers=False,
         patch_artist=True,
         boxprops={"facecolor": "#DCEBF5", "edgecolor": BLUE, "linewidth": 0.9},
         medianprops={"color": VERMILLION, "linewidth": 2.4, "solid_capstyle": "butt"},
@@ -449,34 +545,39 @@ def draw_responses(
         for framing, rows in scores.groupby("framing", sort=False)
     }
     framings = [codebook.framing_label(name) for name in totals.framing]
-    pictures = [
-        _picture(
-            "scores",
-            f"Scores per {codebook.level}",
-            "Points of each technique (thesis, figure 5.3): a strong preference gives two, a "
-            "slight one gives one, "
-            "no difference gives none.",
-            "; ".join(
-                f"{codebook.framing_label(framing)}: "
-                + ", ".join(f"{labels[name]} {score}" for name, score in one.items())
-                for framing, one in points.items()
-            ),
-            _bars,
-            points,
-            {name: (codebook.framing_label(name), f"{total[name]}") for name in points},
-            labels,
-            f"points (total of the {codebook.level} in brackets)",
-            0,
-            simulated=simulated,
-        )
-    ]
+    pages = _chunks(points, 3 * _rows_that_fit(_bars_in(labels), 0.3))
+    pictures = _paged(
+        "scores",
+        f"Scores per {codebook.level}",
+        "Points of each technique (thesis, figure 5.3): a strong preference gives two, a "
+        "slight one gives one, "
+        "no difference gives none.",
+        pages,
+        lambda page: "; ".join(
+            f"{codebook.framing_label(framing)}: "
+            + ", ".join(f"{labels[name]} {score}" for name, score in points[framing].items())
+            for framing in page
+        ),
+        _bars,
+        points,
+        {name: (codebook.framing_label(name), f"total {total[name]}") for name in points},
+        labels,
+        f"points (total of the {codebook.level} in brackets)",
+        0,
+        simulated=simulated,
+    )
 
     levels = tallies.familiarity(responses)
     pictures.append(
         _picture(
             "familiarity",
             "Familiarity with computer graphics",
-            f"Self-rating of the {responses.participants} participants (thesis, figure 5.4).",
+            f"Self-rating of the {responses.participants} participants (thesis, figure 5.4)"
+            + (
+                f"; {int(responses.ratings.isna().sum())} gave none."
+                if responses.ratings.isna().any()
+                else "."
+            ),
             "; ".join(f"{row.label}: {row.participants}" for row in levels.itertuples()),
             _familiarity,
             levels,
@@ -513,62 +614,74 @@ def draw_responses(
         )
     )
 
-    distributions = tallies.distributions(responses)
-    for framing, table in distributions.groupby("framing", sort=False):
-        where = codebook.framing_label(framing)
-        pictures.append(
-            _picture(
-                f"preferences_{slugs[framing]}",
-                f"Each technique against each other one: {where}",
-                "How the answers divide (thesis, figures 5.6, 5.7a and 5.9). Bars to the "
-                "left: the technique in the "
-                "panel's title was preferred; to the right: the one in the row. Numbers in "
-                "the bars count answers.",
-                "; ".join(
-                    f"{codebook.label(row.technique)} against {codebook.label(row.opponent)}: "
-                    f"{row.strong_technique} strong and {row.slight_technique} slight for the "
-                    f"first, {row.none} none, "
-                    f"{row.slight_opponent} slight and {row.strong_opponent} strong for the second"
-                    for row in table.itertuples()
-                    if codebook.techniques.index(row.technique)
-                    < codebook.techniques.index(row.opponent)
-                ),
-                _preferences,
-                table,
-                codebook,
-                simulated=simulated,
-            )
-        )
+    if len(used) <= MOST_PREFERENCES:
+        pictures += _draw_preferences(responses, slugs)
 
     values = tallies.preferences(responses, pair)
     if values:
         a, b = (codebook.label(name) for name in pair)
-        pictures.append(
-            _picture(
-                "pair",
-                f"{a} against {b} at each {codebook.level}",
-                "Box plot of all answers (thesis, figure 5.7b): box from the lower to the "
-                "upper quartile, median in orange, "
-                "whiskers to the extremes, one dot an answer.",
-                "; ".join(
-                    f"{codebook.framing_label(framing)}: {(one < 0).sum()} for {a}, "
-                    f"{(one == 0).sum()} none, "
-                    f"{(one > 0).sum()} for {b}, median {np.median(one):g}"
-                    for framing, one in values.items()
-                ),
-                _pair,
-                values,
-                tuple(pair),
-                codebook,
-                simulated=simulated,
-            )
+        pictures += _paged(
+            "pair",
+            f"{a} against {b} at each {codebook.level}",
+            "Box plot of all answers (thesis, figure 5.7b): box from the lower to the "
+            "upper quartile, median in orange, whiskers to the extremes, one dot an answer. "
+            "Quartiles are those of grouped data: each answer stands for an interval of width 1 "
+            "about it, so that a box does not collapse where many gave the same one.",
+            _chunks(values, 11),
+            lambda page: "; ".join(
+                f"{codebook.framing_label(framing)}: {(values[framing] < 0).sum()} for {a}, "
+                f"{(values[framing] == 0).sum()} none, {(values[framing] > 0).sum()} for {b}, "
+                f"median {np.median(values[framing]):g}"
+                for framing in page
+            ),
+            _pair,
+            values,
+            tuple(pair),
+            codebook,
+            simulated=simulated,
         )
     if found:
         shares = {
             framing: dict(zip(responses.items[framing], one.vector, strict=True))
             for framing, one in found.items()
         }
-        pictures.append(draw_priorities(shares, found, codebook, simulated))
+        without = [codebook.framing_label(name) for name in responses.items if name not in found]
+        pictures += draw_priorities(shares, found, codebook, simulated, without)
+    return pictures
+
+
+def _draw_preferences(responses: Responses, slugs: Mapping[str, str]) -> list[Picture]:
+    """How the answers about each pair divide, a figure a framing."""
+    codebook, pictures = responses.codebook, []
+    distributions = tallies.distributions(responses)
+    for framing, table in distributions.groupby("framing", sort=False):
+        where = codebook.framing_label(framing)
+        techniques = list(dict.fromkeys(table.technique))
+        height = 0.42 + _row_in([_wrapped(codebook.label(name), 15) for name in techniques]) * (
+            len(techniques) - 1
+        )
+        place = {name: at for at, name in enumerate(codebook.techniques)}
+        pictures += _paged(
+            f"preferences_{slugs[framing]}",
+            f"Each technique against each other one: {where}",
+            "How the answers divide (thesis, figures 5.6, 5.7a and 5.9). Bars to the "
+            "left: the technique in the "
+            "panel's title was preferred; to the right: the one in the row. Numbers in "
+            "the bars count answers.",
+            _chunks(techniques, 3 * _rows_that_fit(height, 0.5)),
+            lambda page, table=table, place=place: "; ".join(
+                f"{codebook.label(row.technique)} against {codebook.label(row.opponent)}: "
+                f"{row.strong_technique} strong and {row.slight_technique} slight for the "
+                f"first, {row.none} none, "
+                f"{row.slight_opponent} slight and {row.strong_opponent} strong for the second"
+                for row in table[table.technique.isin(page)].itertuples()
+                if place[row.technique] < place[row.opponent]
+            ),
+            _preferences,
+            table,
+            codebook,
+            simulated=responses.simulated,
+        )
     return pictures
 
 
@@ -577,9 +690,14 @@ def draw_priorities(
     found: Mapping[str, Priorities],
     codebook: Codebook,
     simulated: bool = False,
-) -> Picture:
-    """AHP priorities, one panel a framing. shares: framing -> technique -> priority."""
+    without: Sequence[str] = (),
+) -> list[Picture]:
+    """AHP priorities, one panel a framing. shares: framing -> technique -> priority.
+
+    without: labels of the framings that have none.
+    """
     used = [name for name in codebook.techniques if any(name in one for one in shares.values())]
+    labels = {name: codebook.label(name) for name in used}
     titles = {
         framing: (
             codebook.framing_label(framing),
@@ -587,22 +705,22 @@ def draw_priorities(
         )
         for framing, one in found.items()
     }
-    return _picture(
+    return _paged(
         "priorities",
         f"AHP priorities per {codebook.level}",
-        (
-            "Principal eigenvector of the matrix of judgements, scaled to sum 1 (thesis, table "
-            "5.2), with the consistency ratio."
-        ),
-        "; ".join(
+        "Principal eigenvector of the matrix of judgements, scaled to sum 1 (thesis, table "
+        "5.2), with the consistency ratio."
+        + (f" Not drawn, since a pair has no answer: {', '.join(without)}." if without else ""),
+        _chunks(shares, 3 * _rows_that_fit(_bars_in(labels), 0.3)),
+        lambda page: "; ".join(
             f"{' '.join(titles[framing])}: "
-            + ", ".join(f"{codebook.label(name)} {share:.3f}" for name, share in one.items())
-            for framing, one in shares.items()
+            + ", ".join(f"{labels[name]} {share:.3f}" for name, share in shares[framing].items())
+            for framing in page
         ),
         _bars,
         shares,
         titles,
-        {name: codebook.label(name) for name in used},
+        labels,
         f"priority (sums to 1 within a {codebook.level})",
         3,
         simulated=simulated,

@@ -33,6 +33,7 @@ PREAMBLE = (
 \documentclass[10pt]{article}
 \usepackage[T1]{fontenc}
 \usepackage[utf8]{inputenc}
+\usepackage{lmodern}
 \usepackage{textcomp}
 \usepackage[a4paper,landscape,margin=15mm]{geometry}
 \usepackage{booktabs,longtable}

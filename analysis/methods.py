@@ -72,6 +72,26 @@ REFERENCES = {
         "Kerby, D. S. (2014). The simple difference formula: an approach to "
         "teaching nonparametric correlation. Comprehensive Psychology 3. doi:10.2466/11.IT.3.1"
     ),
+    "firth1993": (
+        "Firth, D. (1993). Bias reduction of maximum likelihood estimates. Biometrika 80(1), "
+        "27-38. doi:10.1093/biomet/80.1.27"
+    ),
+    "kosmidis2009": (
+        "Kosmidis, I. and Firth, D. (2009). Bias reduction in exponential family nonlinear "
+        "models. Biometrika 96(4), 793-804. doi:10.1093/biomet/asp055"
+    ),
+    "westfall1993": (
+        "Westfall, P. H. and Young, S. S. (1993). Resampling-based multiple testing. Wiley, "
+        "section 2.5."
+    ),
+    "liang1986": (
+        "Liang, K.-Y. and Zeger, S. L. (1986). Longitudinal data analysis using generalized "
+        "linear models. Biometrika 73(1), 13-22. doi:10.1093/biomet/73.1.13"
+    ),
+    "clark1973": (
+        "Clark, H. H. (1973). The language-as-fixed-effect fallacy. Journal of Verbal Learning "
+        "and Verbal Behavior 12(4), 335-359. doi:10.1016/S0022-5371(73)80014-3"
+    ),
     "okabe2002": (
         "Okabe, M. and Ito, K. (2002). Color Universal Design: how to make figures "
         "and presentations that are friendly to colorblind people."
@@ -164,7 +184,8 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             f"the diagonal in the order {names} and inverted below it, and by the geometric "
             "mean; priorities are the principal eigenvector "
             "and, beside it, the geometric means of the rows; CR uses Saaty's random index "
-            "for up to 10 techniques.",
+            "for up to 10 techniques, and is set against the CR of studies with the same strengths "
+            f"whose directions are settled by a coin ({options.resamples} of them).",
         ),
         (
             "Worths",
@@ -180,8 +201,15 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             f"(by adaptive Gauss-Hermite quadrature for up to {QUADRATURE_ITEMS} techniques "
             f"and at most {FEW_ANSWERS} answers a person; without "
             f"random effects where nobody gave more than {NO_TASTE} answers). "
-            f"Models fitted: {', '.join(options.models)}. All are maximum likelihood; where "
-            "it has no finite maximum no worth is given.",
+            f"Models fitted: {', '.join(options.models)}. All are maximum likelihood where it "
+            "has a finite maximum under this handling of ties; "
+            + (
+                "where it has none (a technique that never wins, or never loses), fits with "
+                "reduced bias [firth1993, kosmidis2009], and for the ordinal model weak normal "
+                "priors, stand in and are marked."
+                if options.fallback != "none"
+                else "where it has none no worth is given."
+            ),
         ),
         (
             "Intervals",
@@ -189,7 +217,11 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             f"all of their answers, {options.resamples} times "
             f"(seed {options.seed}) and are expanded percentile intervals [hesterberg2015]; "
             "those of the ordinal model are Wald's, those of "
-            "Kendall's u and Krippendorff's alpha are jackknifed over participants.",
+            "Kendall's u and Krippendorff's alpha are jackknifed over participants. "
+            "Where a resample has no finite maximum, all resamples are fitted with reduced bias "
+            "and the interval is at least Wald's. "
+            "Adjusted intervals of differences hold together over the declared family, by the "
+            "largest studentised deviation over the resamples [westfall1993].",
         ),
         (
             "Differences",
@@ -201,7 +233,11 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             f"{'Wilcoxon test' if options.test == 'wilcoxon' else 'sign test'}, corrected by "
             "Holm's procedure [holm1979] over the pairs of "
             f"{family}, at {alpha:g}. Effect sizes are the matched-pairs "
-            "rank-biserial correlation [kerby2014] and the standardised mean difference.",
+            "rank-biserial correlation [kerby2014] and the standardised mean difference. Beside "
+            "the tests of single pairs, which decide, stand contrasts of a linear model of all "
+            "answers with people as clusters [liang1986], tests by sign flips of people of any "
+            f"difference at all, of additivity and of an interaction of technique and {codebook.level}, and "
+            "t tests over the kinds of images, taken as a sample [clark1973].",
         ),
         ("Equivalence", _equivalence(options, alpha, declared)),
         (
@@ -258,16 +294,20 @@ def markdown(responses: Responses, options: Options, declared: str, command: str
         lines += [f"Command: `{command}`; table sha256 `{responses.sha256}`.", ""]
     lines += ["## References", ""]
     used = "".join(text for _, text in parts)
-    lines += [
-        f"- [{key}] {reference}" for key, reference in REFERENCES.items() if f"[{key}]" in used
-    ]
+    lines += [f"- [{key}] {REFERENCES[key]}" for key in keys_in(used)]
     return "\n".join(lines) + "\n"
 
 
+def keys_in(text: str) -> list[str]:
+    """The keys of the references that are cited, in the order of `REFERENCES`."""
+    cited = set(re.findall(r"\w+", " ".join(re.findall(r"\[([\w, ]+)\]", text))))
+    return [key for key in REFERENCES if key in cited]
+
+
 def cited(text: str, order: Mapping[str, int]) -> str:
-    """References [key] as their numbers [3]."""
+    """References [key] and [key, other] as their numbers [3] and [3, 4]."""
     for key, place in order.items():
-        text = text.replace(f"[{key}]", f"[{place}]")
+        text = re.sub(rf"(?<=[\[ ]){key}(?=[\],])", str(place), text)
     return text
 
 

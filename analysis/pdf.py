@@ -22,8 +22,13 @@ from analysis.figures import DOUBLE_MM, SIMULATED, Picture
 from analysis.shown import Shown
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.typ"
-#: Width of the text on the page, mm.
-TEXT_MM = 174
+#: Width of the text on the page, mm, no less than the widest figure, so that no letter shrinks; its
+#: height; and the gap between two figures beside each other.
+TEXT_MM, PAGE_MM, GAP_MM = 178, 257, 4
+#: A caption: letters on a line of the whole width, height of a line, room about a figure, mm.
+LETTERS, LINE_MM, ROOM_MM = 118, 4.2, 7.0
+#: Tables with more columns are set across.
+MOST_COLUMNS = 9
 
 
 def make(
@@ -39,8 +44,9 @@ def make(
     """The PDF. summary and methods: (heading, sentences) and (heading, text)."""
     with tempfile.TemporaryDirectory(prefix="subdermal-") as folder:
         root = Path(folder)
-        for place, picture in enumerate(pictures):
-            (root / f"{place}.svg").write_bytes(picture.svg)
+        places = {picture.name: place for place, picture in enumerate(pictures)}
+        for picture in pictures:
+            (root / f"{places[picture.name]}.svg").write_bytes(picture.svg)
         data = {
             "title": title,
             "subtitle": subtitle,
@@ -50,16 +56,23 @@ def make(
                 for heading, sentences in summary
                 if sentences
             ],
-            "pictures": [
-                {
-                    "file": f"{place}.svg",
-                    "title": picture.title,
-                    "caption": picture.caption,
-                    "alt": picture.alt,
-                    "width_mm": min(TEXT_MM, _width_mm(picture.svg)),
-                }
-                for place, picture in enumerate(pictures)
+            "pages": [
+                [
+                    [
+                        {
+                            "file": f"{places[picture.name]}.svg",
+                            "title": picture.title,
+                            "caption": picture.caption,
+                            "alt": picture.alt,
+                            "width_mm": min(TEXT_MM, _size_mm(picture.svg)[0]),
+                        }
+                        for picture in row
+                    ]
+                    for row in page
+                ]
+                for page in packed(pictures)
             ],
+            "most_columns": MOST_COLUMNS,
             "tables": [asdict(one) for one in tables],
             "methods": [{"heading": heading, "text": text} for heading, text in methods],
             "references": list(references),
@@ -72,7 +85,46 @@ def make(
         )
 
 
-def _width_mm(svg: bytes) -> float:
-    """The width of a figure, from its SVG (points)."""
-    found = re.search(rb'<svg[^>]*? width="([0-9.]+)pt"', svg)
-    return float(found[1]) / 72 * 25.4 if found else DOUBLE_MM
+def packed(pictures: Sequence[Picture]) -> list[list[list[Picture]]]:
+    """Pages of rows of figures: two narrow ones beside each other, each row on the first page that
+    has room for it, so that no page is left half empty before a tall figure.
+    """
+    rows: list[list[Picture]] = []
+    alone: list[Picture] | None = None
+    for picture in pictures:
+        narrow = 2 * _size_mm(picture.svg)[0] + GAP_MM <= TEXT_MM
+        if narrow and alone is not None:
+            alone.append(picture)
+            alone = None
+            continue
+        row = [picture]
+        rows.append(row)
+        alone = row if narrow else alone
+    pages: list[tuple[float, list[list[Picture]]]] = []
+    for row in rows:
+        height = max(_height_mm(picture, len(row)) for picture in row)
+        for place, (used, page) in enumerate(pages):
+            if used + height <= PAGE_MM:
+                pages[place] = used + height, [*page, row]
+                break
+        else:
+            pages.append((height, [row]))
+    return [page for _, page in pages]
+
+
+def _height_mm(picture: Picture, beside: int) -> float:
+    """The height of a figure with its caption, where so many stand in its row."""
+    width, height = _size_mm(picture.svg)
+    letters = LETTERS / beside
+    lines = -(-len(f"Figure 10: {picture.title}. {picture.caption}") // letters)
+    return height * min(1.0, TEXT_MM / width) + lines * LINE_MM + ROOM_MM
+
+
+def _size_mm(svg: bytes) -> tuple[float, float]:
+    """Width and height of a figure, from its SVG (points)."""
+    sizes = [
+        re.search(rb'<svg[^>]*? %s="([0-9.]+)pt"' % name, svg) for name in (b"width", b"height")
+    ]
+    if not all(sizes):
+        return DOUBLE_MM, DOUBLE_MM / 2
+    return tuple(float(one[1]) / 72 * 25.4 for one in sizes)

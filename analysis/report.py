@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import jinja2
@@ -38,7 +38,7 @@ from analysis.files import replacing
 from analysis.methods import rejected_rows
 from analysis.methods import versions as _versions
 from analysis.objective import Measured
-from analysis.options import Options
+from analysis.options import OVERALL, Options
 from analysis.responses import Responses
 from analysis.shown import NOTHING
 
@@ -59,12 +59,14 @@ def report_responses(
     options: Options | None = None,
     declared: str = UNDECLARED,
     measured: Measured | None = None,
+    progress: Callable[[Iterable], Iterable] = lambda steps: steps,
 ) -> dict[str, bytes]:
     """All files of the analysis of a response table: path inside the output folder -> content.
 
     pair: the two techniques of the box plot; without it golubev and golubev_plus where both are
     present, else the first two. options: the choices of the analysis, and `declared`, where they
-    come from; measured: what the manifest holds of cost and fidelity.
+    come from; measured: what the manifest holds of cost and fidelity. progress wraps the list of
+    tables, as tqdm does.
     """
     options = options or Options()
     codebook = responses.codebook
@@ -97,7 +99,7 @@ def report_responses(
             columns=["line", "column", "value", "expected"],
         ),
     } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
-    results = compute.everything(responses, options)
+    results = compute.everything(responses, options, progress)
     tables |= results.tables
     beside, correlated = None, None
     if measured is not None:
@@ -113,7 +115,9 @@ def report_responses(
     if measured is not None:
         for measure, rows in beside.groupby("measure", sort=False):
             about = objective.MEASURES[measure]
-            pictures.append(worth_figures.draw_objective(rows, measure, about, codebook, simulated))
+            pictures += worth_figures.draw_objective(
+                rows, measure, about, codebook, simulated, 100 * options.level
+            )
         said = objective.sentences(beside, correlated, measured.notes, codebook)
     pictures += figures.draw_responses(responses, found, pair, slugs)
     read = shown.all_shown(results.tables, codebook, options)
@@ -121,7 +125,9 @@ def report_responses(
     concluded = conclusions.conclude(
         results.tables, results.notes, codebook, options, responses.participants, simulated
     )
-    counted = _summary(responses, scores, totals, sides, comparisons, found, pair)
+    chance = results.tables["ahp_consistency"].query("aggregation == 'median'")
+    chance = dict(zip(chance.framing, chance.chance_share, strict=True))
+    counted = _summary(responses, scores, totals, sides, comparisons, found, pair, chance)
     title = codebook.title or "Answers to pairs of images"
     subtitle = (
         "Which of two images looks more realistic: what was answered, what follows "
@@ -136,12 +142,7 @@ def report_responses(
     ]
     text = methods.paragraphs(responses, options, declared)
     used = "".join(words for _, words in text)
-    cited = {
-        key: place
-        for place, key in enumerate(
-            (key for key in methods.REFERENCES if f"[{key}]" in used), start=1
-        )
-    }
+    cited = {key: place for place, key in enumerate(methods.keys_in(used), start=1)}
     references = [methods.REFERENCES[key] for key in cited]
     numbered = [(heading, methods.cited(words, cited)) for heading, words in text]
     more = {
@@ -183,7 +184,7 @@ def report_responses(
             (codebook.framing_label(row.framing), row.left, row.none, row.right)
             for row in sides.itertuples()
         ],
-        matrices=_matrices(comparisons, found, codebook),
+        matrices=_matrices(comparisons, found, codebook, chance),
         priorities=_crossed(tables["ahp_priorities"], "priority", codebook, list(responses.items)),
         rule=RULE,
         order=[codebook.label(name) for name in codebook.techniques],
@@ -191,7 +192,7 @@ def report_responses(
         framings=[codebook.framing_label(name) for name in codebook.framings],
         framing_rule=codebook.framing_rule,
         codebook=codebook,
-        notes=responses.notes,
+        notes=[_plain(note, codebook) for note in responses.notes],
         findings=responses.findings[:SHOWN_ROWS],
         rows=responses.rows,
         when=_when(responses),
@@ -218,7 +219,7 @@ def report_matrices(
     shares = {name: dict(zip(items, one.vector, strict=True)) for name, one in found.items()}
     return _files(
         tables,
-        [figures.draw_priorities(shares, found, codebook)],
+        figures.draw_priorities(shares, found, codebook),
         {},
         title="Priorities from matrices of judgements",
         subtitle="The matrices as given, their priorities and how coherent they are.",
@@ -310,7 +311,10 @@ def _files(
     page = {
         "versions": _versions(),
         "files": sorted(files),
-        "pictures": {one.name: one for one in pictures},
+        "pictures": {
+            kind: [one for one in pictures if (one.kind or one.name) == kind]
+            for kind in dict.fromkeys(one.kind or one.name for one in pictures)
+        },
         **page,
     }
     files["report.html"] = environment.get_template("report.html").render(page).encode()
@@ -337,13 +341,43 @@ def _pdf(*parts: object) -> bytes:
     return pdf.make(*parts)
 
 
+#: Words for the names of columns and statistics that notes are written in.
+NAMES = {
+    **conclusions.MODEL_NAMES,
+    "holm_p": "Holm's p",
+    "log_nu": "log nu",
+    "kendall_u_conditional": "Kendall's u with ties kept",
+    "kendall_u": "Kendall's u",
+    "krippendorff_alpha": "Krippendorff's alpha",
+    "side_effect": "side effect",
+    "one_side_share": "of one side",
+    "answered_share": "of answered questions",
+    "same_answer_share": "of the same answer",
+    "median_rt_ms": "of the median time",
+    "repeat_share": "of answers when asked again",
+    "strength_slope": "Strength over the order",
+    "side_slope": "Side over the order",
+    "time_slope": "Time over the order",
+    "carry_over": "Carry-over",
+    "rt_ms": "the time of an answer",
+    "started_at": "when a question was shown",
+}
+
+
 def _plain(line: str, codebook: Codebook) -> str:
-    """A note of the computation as a sentence of the page."""
+    """A note of the computation as a sentence of the page: labels and words for names."""
     name, mark, rest = line.partition(":")
-    if mark and name in codebook.framings:
-        line = f"{codebook.framing_label(name)}:{rest}"
-    first = line.partition(" ")[0]
-    return (line if "_" in first else line[:1].upper() + line[1:]).rstrip(".") + "."
+    head, comma, model = name.partition(", ")
+    if mark and head in (*codebook.framings, OVERALL):
+        line = f"{worth_figures.framing_label(codebook, head)}{comma}{model}:{rest}"
+    line = re.sub(
+        r"(?<![\w-])("
+        + "|".join(sorted(map(re.escape, NAMES), key=len, reverse=True))
+        + r")(?!\w)",
+        lambda match: NAMES[match[0]],
+        conclusions.with_labels(line, codebook),
+    )
+    return (line[:1].upper() + line[1:]).rstrip(".") + "."
 
 
 def _digits(value: float | None, digits: int = 3) -> str:
@@ -380,7 +414,10 @@ def _matrix_table(comparison: Comparison) -> pd.DataFrame:
 
 
 def _matrices(
-    comparisons: Mapping[str, Comparison], found: Mapping[str, Priorities], codebook: Codebook
+    comparisons: Mapping[str, Comparison],
+    found: Mapping[str, Priorities],
+    codebook: Codebook,
+    chance: Mapping[str, float] | None = None,
 ) -> list[dict]:
     return [
         {
@@ -391,6 +428,9 @@ def _matrices(
             ],
             "missing": [f"{codebook.label(a)} with {codebook.label(b)}" for a, b in one.missing],
             "found": found.get(name),
+            "words": _coherence(found[name], (chance or {}).get(name, np.nan))
+            if name in found
+            else "",
         }
         for name, one in comparisons.items()
     ]
@@ -417,6 +457,7 @@ def _summary(
     comparisons: Mapping[str, Comparison],
     found: Mapping[str, Priorities],
     pair: tuple[str, str],
+    chance: Mapping[str, float],
 ) -> list[str]:
     """What the numbers say, in sentences that hold for these answers and claim no more."""
     codebook, frame = responses.codebook, responses.frame
@@ -466,7 +507,7 @@ def _summary(
                         f"first{' too' if top == best else ''}."
                     )
         if framing in found:
-            words += f" {_coherence(found[framing])}"
+            words += f" {_coherence(found[framing], chance.get(framing, np.nan))}"
         elif comparisons[framing].missing:
             words += (
                 f" No priorities: {_count(len(comparisons[framing].missing), 'pair')} "
@@ -521,7 +562,15 @@ def _first(values: Mapping[str, float], codebook: Codebook) -> list[str]:
     ]
 
 
-def _coherence(found: Priorities) -> str:
+def _coherence(found: Priorities, chance: float = np.nan) -> str:
+    """Saaty's verdict, and how often answers without any preference look as coherent."""
     if found.cr is None:
         return f"There is {found.verdict}."
-    return f"The judgements are {found.verdict}, CR {found.cr:z.3f}."
+    words = f"The judgements are {found.verdict} by Saaty's rule, CR {found.cr:z.3f}"
+    if np.isnan(chance):
+        return words + "."
+    return (
+        f"{words}; of random answers of this design, directions settled by a coin, "
+        f"{100 * chance:.0f} % have a CR as low"
+        + (", so that it shows no coherence." if chance > 0.05 else ".")
+    )

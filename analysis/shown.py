@@ -7,7 +7,7 @@ digit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -31,6 +31,8 @@ STATISTICS = DRAWN | {
     "median_rt_ms_none": "the same, no difference seen",
 }
 NOTHING = "\N{EN DASH}"
+#: So many rows of a table are read on the page, in the PDF and in LaTeX.
+MOST_ROWS = 400
 MINUS = "\N{MINUS SIGN}"
 
 
@@ -77,16 +79,19 @@ def probability(p: float | None) -> str:
 def worths(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
     models = [name for name in MODELS if name in set(table.model)]
     cells = table.set_index(["framing", "technique", "model"])
+    marked = ~table.fit.isin(["maximum likelihood", ""])
     rows = []
     for framing in dict.fromkeys(table.framing):
         here = table[table.framing == framing]
         for technique in dict.fromkeys(here.technique):
-            values = [
-                interval(*cells.loc[(framing, technique, model), ["estimate", "low", "high"]])
-                if (framing, technique, model) in cells.index
-                else NOTHING
-                for model in models
-            ]
+            values = []
+            for model in models:
+                if (framing, technique, model) not in cells.index:
+                    values.append(NOTHING)
+                    continue
+                one = cells.loc[(framing, technique, model)]
+                star = "*" if one.fit not in ("maximum likelihood", "") else ""
+                values.append(interval(one.estimate, one.low, one.high) + star)
             rows.append((framing_label(codebook, framing), codebook.label(technique), *values))
     return Shown(
         "worths",
@@ -98,15 +103,19 @@ def worths(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
         ),
         (False, False, *[True] * len(models)),
         tuple(rows),
-        (
-            "Intervals by resampling participants, those of the ordinal model by Wald from its "
-            "information."
+        "Intervals are those of one technique alone, by resampling participants; those of the "
+        "ordinal model by Wald from its information."
+        + (
+            " *: maximum likelihood has no finite worths; a fit with reduced bias (Firth), for the "
+            "ordinal model one with weak priors, stands in."
+            if marked.any()
+            else ""
         ),
     )
 
 
 def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
-    alpha = alpha_of(options)
+    alpha, level = alpha_of(options), 100 * options.level
     rows = [
         (
             framing_label(codebook, row.framing),
@@ -118,17 +127,18 @@ def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
                 for count in (row.strong_a, row.slight_a, row.none, row.slight_b, row.strong_b)
             ),
             interval(row.mean_preference, row.low, row.high),
-            probability(row.wilcoxon_p),
-            probability(row.sign_p),
+            bounds(row.simultaneous_low, row.simultaneous_high),
+            probability(getattr(row, f"{options.test}_p")),
             probability(row.holm_p),
             probability(row.tost_p),
             probability(row.tost_holm_p),
-            number(row.rank_biserial),
             interval(row.jod, row.jod_low, row.jod_high),
+            bounds(row.jod_simultaneous_low, row.jod_simultaneous_high),
             VERDICTS[verdict(row, alpha)][0],
         )
         for row in table.itertuples()
     ]
+    test = {"wilcoxon": "Wilcoxon", "sign": "Sign"}[options.test]
     return Shown(
         "pairs",
         "Every pair: answers, tests and what they come to",
@@ -139,22 +149,196 @@ def pairs(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
             "n",
             "Answers",
             "Mean preference for B",
-            "Wilcoxon p",
-            "Sign p",
+            "adjusted",
+            f"{test} p",
             "Holm p",
             "TOST p",
             "TOST Holm p",
-            "Rank-biserial",
             "JOD, B less A",
+            "adjusted",
             "Verdict",
         ),
         (False, False, False, *[True] * 10, False),
         tuple(rows),
         "Answers: strong for A / slight for A / no difference / slight for B / strong for B. "
         "Positive numbers favour B. "
+        f"Intervals in brackets after a number are at {level:g} % for that pair alone; adjusted "
+        "ones hold together for all pairs of the family. "
         f"Holm's correction is of the {_test(options)} and of the two one-sided tests (TOST), "
         f"over the pairs of {_family(options, codebook)}; "
         f"the verdict is at {alpha:g}.",
+    )
+
+
+def bounds(low: float, high: float) -> str:
+    """'[0.90, 1.56]', an en dash where there is no interval."""
+    if not np.isfinite(low) or not np.isfinite(high):
+        return NOTHING
+    return f"[{number(low)}, {number(high)}]"
+
+
+def effects(
+    table: pd.DataFrame, contrasts: pd.DataFrame, codebook: Codebook, options: Options
+) -> Shown:
+    """Effect sizes of each pair, and the contrast that all answers of a framing give."""
+    other = {(row.framing, row.a, row.b): row for row in contrasts.itertuples()}
+    rows = []
+    for row in table.itertuples():
+        one = other.get((row.framing, row.a, row.b))
+        rows.append(
+            (
+                framing_label(codebook, row.framing),
+                codebook.label(row.a),
+                codebook.label(row.b),
+                interval(row.rank_biserial, row.rank_biserial_low, row.rank_biserial_high),
+                interval(row.dz, row.dz_low, row.dz_high),
+                NOTHING if one is None else interval(one.estimate, one.low, one.high),
+                NOTHING if one is None else probability(one.p),
+                NOTHING if one is None else probability(one.holm_p),
+            )
+        )
+    return Shown(
+        "effects",
+        "Effect sizes, and contrasts of all answers",
+        (
+            *(codebook.heading, "A", "B", "Rank-biserial", "Standardised mean"),
+            *("Contrast, points", "p", "Holm p"),
+        ),
+        (False, False, False, *[True] * 5),
+        tuple(rows),
+        f"Intervals at {100 * options.level:g} % for each number alone. The contrast is the "
+        "difference of worths in a linear model of all answers of the framing, with people as "
+        "clusters; it stands beside the declared test and decides nothing.",
+    )
+
+
+def omnibus(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    names = {
+        "techniques": "is any technique preferred?",
+        "additivity": "do differences of worths fail to add up?",
+        "interaction": f"does what is preferred depend on the {codebook.level}?",
+    }
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            names.get(row.question, row.question),
+            f"{row.people:g}",
+            number(row.size, 3),
+            probability(row.p),
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "omnibus",
+        "Before any pair is singled out",
+        (codebook.heading, "Question", "People", "Size, points", "p"),
+        (False, False, True, True, True),
+        tuple(rows),
+        "By flipping the sign of each person's answers by a fair coin.",
+    )
+
+
+def by_images(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    rows = [
+        (
+            codebook.label(row.a),
+            codebook.label(row.b),
+            f"{row.images:g}",
+            interval(row.mean_preference, row.low, row.high),
+            f"{number(row.least)} to {number(row.most)}",
+            probability(row.p),
+            probability(row.holm_p),
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "by_images",
+        "Kinds of images as a sample",
+        ("A", "B", "Images", "Mean preference for B", "From to", "p", "Holm p"),
+        (False, False, *[True] * 5),
+        tuple(rows),
+        "One number a kind of image (framing, and what else is varied), Student's t test over "
+        "them: whether a difference would hold for other images of that sort.",
+    )
+
+
+def goodness(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            MODELS.get(row.model, (row.model,))[0],
+            f"{row.parameters:g}",
+            number(row.log_likelihood, 1),
+            number(row.deviance, 1),
+            NOTHING if np.isnan(row.df) else f"{row.df:g}",
+            probability(row.p),
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "goodness",
+        "How well the models describe the pairs",
+        (
+            *(codebook.heading, "Model", "Parameters", "Log-likelihood"),
+            *("Deviance", "df", "p"),
+        ),
+        (False, False, *[True] * 5),
+        tuple(rows),
+        "Deviance from a number of its own for each pair, by chi-square; answers are taken as "
+        "independent, which those of one person are not, and ties as half wins make it small.",
+    )
+
+
+def order_effects(table: pd.DataFrame) -> Shown:
+    names = {
+        "strength_slope": "strength of an answer, points over 10 questions",
+        "side_slope": "answer, points to the right over 10 questions",
+        "time_slope": "logarithm of the time of an answer over 10 questions",
+        "carry_over": "same side as the question before, above chance",
+    }
+    rows = [
+        (
+            names.get(row.statistic, row.statistic),
+            f"{row.people:g}",
+            interval(row.value, row.low, row.high, 3),
+            probability(row.p),
+        )
+        for row in table.itertuples()
+    ]
+    return Shown(
+        "order_effects",
+        "Order, fatigue and carry-over",
+        ("What changes", "People", "Mean over people", "p"),
+        (False, True, True, True),
+        tuple(rows),
+    )
+
+
+def models(table: pd.DataFrame, codebook: Codebook) -> Shown:
+    names = {
+        "log_nu": "ties, log nu (Davidson)",
+        "side": "side, logits to the right (ordinal)",
+        "threshold_slight": "threshold of a slight preference, logits",
+        "threshold_strong": "threshold of a strong preference, logits",
+        "sd_preference": "spread of people's tastes, logits",
+        "sd_side": "spread of people's leaning to a side, logits",
+    }
+    rows = [
+        (
+            framing_label(codebook, row.framing),
+            names[row.parameter],
+            interval(row.estimate, row.low, row.high),
+        )
+        for row in table.itertuples()
+        if row.parameter in names
+    ]
+    return Shown(
+        "worth_models",
+        "What the models have beside worths",
+        (codebook.heading, "Parameter", "Estimate"),
+        (False, False, True),
+        tuple(rows),
+        "Spreads are standard deviations over people, without intervals.",
     )
 
 
@@ -223,6 +407,8 @@ def consistency(table: pd.DataFrame, codebook: Codebook) -> Shown:
             else NOTHING,
             number(row.judgement),
             number(row.consistent),
+            number(row.chance_cr, 3),
+            NOTHING if np.isnan(row.chance_share) else f"{100 * row.chance_share:.0f} %",
         )
         for row in table.itertuples()
     ]
@@ -237,9 +423,13 @@ def consistency(table: pd.DataFrame, codebook: Codebook) -> Shown:
             "Look again at",
             "Judgement",
             "The others imply",
+            "CR by chance",
+            "As low by chance",
         ),
-        (False, False, True, True, False, True, True),
+        (False, False, True, True, False, *[True] * 4),
         tuple(rows),
+        "By chance: studies with the same answers' strengths, their directions settled by a coin; "
+        "their median CR, and how many of them have one as low as this study's.",
     )
 
 
@@ -387,15 +577,30 @@ def all_shown(
     found: Sequence[Shown] = (
         worths(tables["worths"], codebook, options),
         pairs(tables["pairs"], codebook, options),
+        effects(tables["pairs"], tables["contrasts"], codebook, options),
+        omnibus(tables["omnibus"], codebook),
+        by_images(tables["by_images"], codebook),
+        goodness(tables["goodness"], codebook),
+        models(tables["worth_models"], codebook),
         priorities(tables["ahp_intervals"], codebook),
         consistency(tables["ahp_consistency"], codebook),
         trend(tables["trend"]),
+        order_effects(tables["order_effects"]),
         agreement(tables["agreement"], codebook),
         sides(tables["side_balance"], codebook),
         familiarity(tables["familiarity_interaction"], codebook),
         sensitivity(tables["sensitivity"], codebook),
     )
-    return {one.name: one for one in found if one.rows}
+    return {one.name: shortened(one) for one in found if one.rows}
+
+
+def shortened(one: Shown) -> Shown:
+    """The table without what is beyond `MOST_ROWS`, which is said; tables/*.csv hold every row."""
+    if len(one.rows) <= MOST_ROWS:
+        return one
+    file = {"effects": "pairs.csv and contrasts.csv"}.get(one.name, f"{one.name}.csv")
+    note = f"The first {MOST_ROWS} of {len(one.rows)} rows; all are in tables/{file}. {one.note}"
+    return replace(one, rows=one.rows[:MOST_ROWS], note=note)
 
 
 def _pair(row: object, codebook: Codebook) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -61,38 +62,49 @@ def draw_results(
 ) -> list[Picture]:
     """The figures of `compute.everything`'s tables, without those that have nothing to show."""
     level, alpha = 100 * options.level, alpha_of(options)
-    drawn = [
-        draw_pairs(tables["pairs"], codebook, options.margin, alpha, simulated),
-        draw_ladder(tables["worths"], codebook, simulated, options.ties, level),
-        draw_worths(tables["worths"], codebook, simulated),
-        draw_scores(tables["tallies"], codebook, simulated),
-        draw_agreement(tables["agreement"], codebook, simulated),
+    worths = tables["worths"]
+    few = [
         draw_triads(tables["participants"], simulated),
     ]
-    return [picture for picture in drawn if picture is not None]
+    return [
+        *draw_pairs(tables["pairs"], codebook, options.margin, alpha, simulated),
+        *draw_ladder(worths, codebook, simulated, options.ties, level),
+        *draw_worths(worths, codebook, simulated, level),
+        *draw_scores(tables["tallies"], codebook, simulated, level),
+        *draw_agreement(tables["agreement"], codebook, simulated, level),
+        *(picture for picture in few if picture is not None),
+    ]
 
 
 def draw_worths(
-    worths: pd.DataFrame, codebook: Codebook, simulated: bool = False
-) -> Picture | None:
+    worths: pd.DataFrame, codebook: Codebook, simulated: bool = False, level: float = 95
+) -> list[Picture]:
     """Every model at every framing: estimates with intervals, each model in its unit."""
     found = worths[worths.estimate.notna()]
     if found.empty:
-        return None
-    return figures._picture(
+        return []
+    framings = list(dict.fromkeys(found.framing))
+    most = found.groupby("framing").technique.nunique().max()
+    height = 0.3 + 0.21 * most + 0.12
+    return figures._paged(
         "worths",
         "Worths with their intervals",
         "Each technique's worth in four models, centred on 0 within a "
         + codebook.level
-        + "; lines are intervals: over resampled "
+        + f"; lines are intervals at {level:g} %, each of one technique alone: over resampled "
         "participants, for the ordinal model by Wald. Models have units of their own: "
-        "compare the order and the gaps against the intervals, not the numbers.",
-        "; ".join(
+        "compare the order and the gaps against the intervals, not the numbers."
+        + stand_ins(found, codebook)
+        + left_out(worths, codebook),
+        figures._chunks(framings, figures._rows_that_fit(height, 0.5)),
+        lambda page: "; ".join(
             f"{framing_label(codebook, framing)}, {MODELS.get(model, (model, ''))[0]}: "
             + ", ".join(
                 f"{codebook.label(row.technique)} {row.estimate:z.2f}" for row in rows.itertuples()
             )
-            for (framing, model), rows in found.groupby(["framing", "model"], sort=False)
+            for (framing, model), rows in found[found.framing.isin(page)].groupby(
+                ["framing", "model"], sort=False
+            )
         ),
         _worths,
         found,
@@ -101,14 +113,11 @@ def draw_worths(
     )
 
 
-def _worths(worths: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings, models = (
-        list(dict.fromkeys(worths.framing)),
-        [name for name in MODELS if name in set(worths.model)],
-    )
+def _worths(framings: list[str], worths: pd.DataFrame, codebook: Codebook) -> Figure:
+    models = [name for name in MODELS if name in set(worths.model)]
     techniques = [name for name in codebook.techniques if name in set(worths.technique)]
-    labels = [figures._wrapped(codebook.label(name), 16) for name in techniques]
-    height = 0.3 + figures._row_in(labels) * 0.85 * len(labels)
+    labels = [figures._cut(codebook.label(name), 20) for name in techniques]
+    height = 0.3 + 0.21 * len(labels)
     figure = Figure(figsize=(WIDTH_IN, len(framings) * height + 0.5), layout="constrained")
     axes = figure.subplots(len(framings), len(models), squeeze=False, sharex="col", sharey=True)
     for row, framing in enumerate(framings):
@@ -133,7 +142,7 @@ def _worths(worths: pd.DataFrame, codebook: Codebook) -> Figure:
                     size=7,
                     color="#666666",
                 )
-            ax.set_yticks(range(len(labels)), labels)
+            ax.set_yticks(range(len(labels)), labels, size=7)
             ax.set_ylim(len(labels) - 0.5, -0.5)
             ax.xaxis.set_major_locator(MaxNLocator(4))
             ax.grid(axis="x")
@@ -144,12 +153,14 @@ def _worths(worths: pd.DataFrame, codebook: Codebook) -> Figure:
                 ax.set_xlabel(unit)
             if column == len(models) - 1:
                 ax.annotate(
-                    framing_label(codebook, framing),
+                    figures._wrapped(starred(framing, worths, codebook, 48), int(9 * height), 3),
                     (1.02, 0.5),
                     xycoords="axes fraction",
                     rotation=270,
                     va="center",
+                    multialignment="center",
                     weight="bold",
+                    size=7.5,
                 )
     return figure
 
@@ -215,28 +226,31 @@ def draw_ladder(
     simulated: bool = False,
     ties: str = "half",
     level: float = 95,
-) -> Picture | None:
-    """The JOD of all techniques on one vertical scale, one ladder a framing."""
+) -> list[Picture]:
+    """The JOD of all techniques, one ladder a framing, each rung a technique."""
     model = worths[worths.model == "thurstone_jod"]
     found = model[model.estimate.notna()]
     if found.empty:
-        return None
-    return figures._picture(
+        return []
+    framings = list(dict.fromkeys(found.framing))
+    height = 0.45 + 0.2 * found.groupby("framing").size().max()
+    return figures._paged(
         "jod_ladder",
         "The JOD ladder",
-        "Thurstone case V worths in just-objectionable differences. "
+        "Thurstone case V worths in just-objectionable differences, the highest on top. "
         + jod_meaning(ties)
         + f" Bars are intervals at {level:g} % over resampled participants, each of one technique "
         f"alone; 0 is the mean of the {codebook.level}."
         + stand_ins(found, codebook)
         + left_out(model, codebook),
-        "; ".join(
+        figures._chunks(framings, 2 * figures._rows_that_fit(height, 0.25)),
+        lambda page: "; ".join(
             f"{framing_label(codebook, framing)}: "
             + ", ".join(
                 f"{codebook.label(row.technique)} {row.estimate:z.2f} JOD"
                 for row in rows.itertuples()
             )
-            for framing, rows in found.groupby("framing", sort=False)
+            for framing, rows in found[found.framing.isin(page)].groupby("framing", sort=False)
         ),
         _ladder,
         found,
@@ -245,49 +259,24 @@ def draw_ladder(
     )
 
 
-def _ladder(found: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings = list(dict.fromkeys(found.framing))
+def _ladder(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
     most = found.groupby("framing", sort=False).size().max()
-    columns = min(4, len(framings))
     figure, panels = figures._panels(
-        len(framings), columns, max(2.5, 0.19 * most), below_in=0.2, sharey=True
+        len(framings), min(2, len(framings)), 0.45 + 0.2 * most, below_in=0.25, sharex=True
     )
-    ends = found[["low", "high", "estimate"]].to_numpy()
-    low, high = np.nanmin(ends), np.nanmax(ends)
-    room = max(high - low, 0.1)
     for ax, framing in zip(panels, framings, strict=True):
-        here = found[found.framing == framing].sort_values("estimate")
-        gap = room * 1.1 / max(11, 1.15 * most)
-        for row, y in zip(here.itertuples(), _apart(here.estimate.to_numpy(), gap), strict=True):
-            if np.isfinite(row.low) and np.isfinite(row.high):
-                ax.plot(
-                    [0, 0],
-                    [row.low, row.high],
-                    color=SKY,
-                    linewidth=5,
-                    alpha=0.45,
-                    solid_capstyle="butt",
-                    zorder=1,
-                )
-            ax.plot([-0.12, 0.12], [row.estimate] * 2, color=BLUE, linewidth=2, zorder=3)
-            ax.plot([0.14, 0.3], [row.estimate, y], color="#888888", linewidth=0.6)
-            ax.text(
-                0.33,
-                y,
-                figures._cut(codebook.label(row.technique), 18),
-                va="center_baseline",
-                size=7.5,
-            )
-        ax.axhline(0, color="#888888", linewidth=0.7, zorder=0)
-        ax.set_title(starred(framing, found, codebook, 18), loc="left")
-        ax.set_xlim(-0.25, 1.75)
-        ax.set_xticks([])
-        ax.spines["bottom"].set_visible(False)
-        ax.set_ylim(low - 0.06 * room, high + 0.06 * room)
-        ax.yaxis.set_major_locator(MaxNLocator(7))
-        ax.tick_params(labelleft=True)
-        ax.grid(axis="y")
-    figure.supylabel("JOD, higher looks more real", size=8)
+        here = found[found.framing == framing].sort_values("estimate", ascending=False)
+        ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+        for place, row in enumerate(here.itertuples()):
+            _interval(ax, row.estimate, row.low, row.high, place)
+        labels = [figures._cut(codebook.label(name), 22) for name in here.technique]
+        ax.set_yticks(range(len(labels)), labels, size=7.5)
+        ax.set_ylim(len(labels) - 0.5, -0.5)
+        ax.set_title(starred(framing, found, codebook, 34), loc="left")
+        ax.xaxis.set_major_locator(MaxNLocator(7))
+        ax.tick_params(labelbottom=True)
+        ax.grid(axis="x")
+    figure.supxlabel("JOD, to the right looks more real", size=8)
     return figure
 
 
@@ -313,52 +302,98 @@ def draw_pairs(
     margin: float | None,
     alpha: float = 0.05,
     simulated: bool = False,
-) -> Picture | None:
-    """Every pair's mean preference and interval beside the margin of equivalence."""
+) -> list[Picture]:
+    """Every pair's mean preference and intervals beside the margin of equivalence; a matrix where
+    there are too many pairs to draw one by one.
+    """
     found = pairs[pairs.mean_preference.notna()]
     if found.empty:
-        return None
+        return []
     verdicts = [verdict(row, alpha) for row in found.itertuples()]
+    found = found.assign(verdict=verdicts)
+    framings = list(dict.fromkeys(found.framing))
+    names = list(dict.fromkeys(zip(found.a, found.b, strict=True)))
+    title = "Every difference, with its interval" + (" and the margin" if margin else "")
     about = (
-        (
-            f"The band is the margin of equivalence, {margin:g} points, and the interval that of "
-            "the equivalence test where there is one. "
-        )
-        if margin
-        else (
-            "No margin of equivalence was declared, so no pair can be called as good as "
-            "each other. "
-        )
+        "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: left of 0 for "
+        "the first technique, right for the second. "
     )
-    return figures._picture(
-        "pairs",
-        "Every difference, with its interval" + (" and the margin" if margin else ""),
-        (
-            "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: left of 0 for "
-            "the first technique, right for the second. "
-        )
-        + about
-        + (
-            "Colour and marker say what the tests come to after Holm's correction, for "
-            "differences and for equivalence."
-        ),
-        "; ".join(
+    verdict_words = (
+        "Colour and marker say what the tests come to after Holm's correction, for "
+        "differences and for equivalence."
+    )
+
+    def alt(rows: pd.DataFrame) -> str:
+        return "; ".join(
             f"{framing_label(codebook, row.framing)}: {codebook.label(row.a)} against "
             f"{codebook.label(row.b)} "
-            f"{row.mean_preference:+z.2f}, {VERDICTS[one][0]}"
-            for row, one in zip(found.itertuples(), verdicts, strict=True)
+            f"{row.mean_preference:+z.2f}, {VERDICTS[row.verdict][0]}"
+            for row in rows.itertuples()
+        )
+
+    if len(names) > MOST_PAIRS:
+        return figures._paged(
+            "pairs",
+            "Every difference",
+            "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: blue where the "
+            "row is preferred to the column, orange the reverse. A dot: the declared test finds a "
+            "difference after Holm's correction; a square: as good as each other. Intervals are in "
+            "the table.",
+            [[framing] for framing in framings],
+            lambda page: alt(found[found.framing.isin(page)]),
+            _pair_matrix,
+            found,
+            codebook,
+            simulated=simulated,
+        )
+    level = 100 * (1 - alpha)
+    lines = (
+        f"Thin lines are intervals at {level:g} % that hold for all pairs of the family together"
+        + (
+            f"; thick ones are those at {100 * (1 - 2 * alpha):g} %, of one pair alone, that the "
+            f"equivalence test takes. The band is the margin of equivalence, {margin:g} points. "
+            if margin
+            else f"; thick ones at {level:g} % of one pair alone. No margin of equivalence was "
+            "declared, so no pair can be called as good as each other. "
+        )
+    )
+    runs = figures._chunks(names, MOST_PAIR_ROWS)
+    per_row = 0.45 + 0.19 * max(map(len, runs))
+    pages = [
+        (part, run)
+        for part in figures._chunks(framings, 4 * figures._rows_that_fit(per_row, 0.45))
+        for run in runs
+    ]
+    return figures._paged(
+        "pairs",
+        title,
+        about + lines + verdict_words,
+        pages,
+        lambda page: alt(
+            found[
+                found.framing.isin(page[0])
+                & np.array([pair in page[1] for pair in zip(found.a, found.b, strict=True)])
+            ]
         ),
         _pairs,
-        found.assign(verdict=verdicts),
+        found,
         codebook,
         margin,
         simulated=simulated,
     )
 
 
-def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Figure:
-    framings = list(dict.fromkeys(found.framing))
-    names = list(dict.fromkeys(zip(found.a, found.b, strict=True)))
+#: So many pairs have a row each in a figure, and so many on one page; more are drawn as a matrix.
+MOST_PAIRS, MOST_PAIR_ROWS = 66, 36
+
+
+def _pairs(
+    page: tuple[list[str], list[tuple[str, str]]],
+    found: pd.DataFrame,
+    codebook: Codebook,
+    margin: float | None,
+) -> Figure:
+    framings, names = page
     labels = [
         f"{figures._cut(codebook.label(a), 16)} \N{EN DASH} {figures._cut(codebook.label(b), 16)}"
         for a, b in names
@@ -367,26 +402,31 @@ def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Fig
     figure, panels = figures._panels(
         len(framings), columns, 0.45 + 0.19 * len(names), below_in=0.45, sharex=True, sharey=True
     )
-    for _place, (ax, framing) in enumerate(zip(panels, framings, strict=True)):
+    place = {pair: at for at, pair in enumerate(names)}
+    for ax, framing in zip(panels, framings, strict=True):
         if margin:
             ax.axvspan(-margin, margin, color=SKY, alpha=0.22, linewidth=0)
         ax.axvline(0, color=INK, linewidth=0.7)
         for row in found[found.framing == framing].itertuples():
+            if (row.a, row.b) not in place:
+                continue
+            y, (_, colour, marker) = place[row.a, row.b], VERDICTS[row.verdict]
             low, high = row.low, row.high
             if margin and np.isfinite(row.equivalence_low):
                 low, high = row.equivalence_low, row.equivalence_high
-            _, colour, marker = VERDICTS[row.verdict]
-            _interval(
-                ax, row.mean_preference, low, high, names.index((row.a, row.b)), colour, marker
-            )
-        ax.set_title(figures._cut(framing_label(codebook, framing), 18), loc="left")
+            if np.isfinite(row.simultaneous_low):
+                ends = [max(row.simultaneous_low, -2), min(row.simultaneous_high, 2)]
+                ax.plot(ends, [y, y], color=colour, linewidth=0.6)
+            _interval(ax, row.mean_preference, low, high, y, colour, marker)
+        ax.set_title(figures._wrapped(framing_label(codebook, framing), 20), loc="left", size=8)
         ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
         ax.set_xlim(-2.05, 2.05)
         ax.set_xticks(range(-2, 3))
         ax.tick_params(labelbottom=True)
         ax.grid(axis="x")
-    panels[(len(panels) - 1) // 2].set_xlabel(
+    last = panels[-columns:] if len(panels) % columns == 0 else panels[-(len(panels) % columns) :]
+    last[(len(last) - 1) // 2].set_xlabel(
         "\N{LEFTWARDS ARROW} first technique      mean preference      second technique "
         "\N{RIGHTWARDS ARROW}"
     )
@@ -403,26 +443,62 @@ def _pairs(found: pd.DataFrame, codebook: Codebook, margin: float | None) -> Fig
     return figure
 
 
+def _pair_matrix(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
+    """One framing as a matrix: how much the row is preferred to the column."""
+    (framing,) = framings
+    here = found[found.framing == framing]
+    items = [name for name in codebook.techniques if name in set(here.a) | set(here.b)]
+    place, n = {name: at for at, name in enumerate(items)}, len(items)
+    values, marks = np.full((n, n), np.nan), {}
+    for row in here.itertuples():
+        i, k = place[row.a], place[row.b]
+        values[i, k], values[k, i] = -row.mean_preference, row.mean_preference
+        marks[i, k] = marks[k, i] = row.verdict
+    size = min(WIDTH_IN, 1.6 + 0.19 * n)
+    figure = Figure(figsize=(WIDTH_IN, size + 0.2), layout="constrained")
+    ax = figure.subplots()
+    colours = LinearSegmentedColormap.from_list("preference", [VERMILLION, "#FFFFFF", BLUE])
+    drawn = ax.imshow(values, cmap=colours, vmin=-2, vmax=2)
+    for (i, k), one in marks.items():
+        if one != "undecided":
+            marker = "s" if one == "equivalent" else "o"
+            ax.plot(k, i, marker, color=INK, markersize=2.4, markeredgewidth=0)
+    labels = [figures._cut(codebook.label(name), 18) for name in items]
+    ax.set_yticks(range(n), labels, size=7)
+    ax.set_xticks(range(n), labels, size=7, rotation=90)
+    ax.tick_params(length=0)
+    ax.set_title(figures._cut(framing_label(codebook, framing), 60), loc="left")
+    bar = figure.colorbar(drawn, ax=ax, shrink=0.6, ticks=range(-2, 3))
+    bar.set_label("mean preference for the row", size=7.5)
+    bar.ax.tick_params(labelsize=7)
+    return figure
+
+
 def draw_scores(
-    scores: pd.DataFrame, codebook: Codebook, simulated: bool = False
-) -> Picture | None:
+    scores: pd.DataFrame, codebook: Codebook, simulated: bool = False, level: float = 95
+) -> list[Picture]:
     """The thesis's figure 5.3 with intervals: points as dots, so that overlap can be seen."""
     found = scores[scores.score.notna() & (scores.framing != OVERALL)]
     if found.empty:
-        return None
-    return figures._picture(
+        return []
+    framings = list(dict.fromkeys(found.framing))
+    labels = [codebook.label(name) for name in found.technique.unique()]
+    height = 0.5 + figures._row_in(figures._row_labels(labels)) * len(labels)
+    return figures._paged(
         "scores_intervals",
         "Scores with their intervals",
-        "The points of figure 5.3 of the thesis with intervals over resampled participants: "
+        "The points of figure 5.3 of the thesis with intervals at "
+        f"{level:g} % over resampled participants, each of one technique alone: "
         "where intervals overlap widely, other people "
         "could have put the techniques in another order.",
-        "; ".join(
+        figures._chunks(framings, 3 * figures._rows_that_fit(height, 0.25)),
+        lambda page: "; ".join(
             f"{codebook.framing_label(framing)}: "
             + ", ".join(
                 f"{codebook.label(row.technique)} {row.score:g} ({row.low:g} to {row.high:g})"
                 for row in rows.itertuples()
             )
-            for framing, rows in found.groupby("framing", sort=False)
+            for framing, rows in found[found.framing.isin(page)].groupby("framing", sort=False)
         ),
         _scores,
         found,
@@ -431,10 +507,9 @@ def draw_scores(
     )
 
 
-def _scores(found: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings = list(dict.fromkeys(found.framing))
+def _scores(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
     techniques = [name for name in codebook.techniques if name in set(found.technique)]
-    labels = [figures._wrapped(codebook.label(name)) for name in techniques]
+    labels = figures._row_labels([codebook.label(name) for name in techniques])
     figure, panels = figures._panels(
         len(framings),
         3,
@@ -446,8 +521,8 @@ def _scores(found: pd.DataFrame, codebook: Codebook) -> Figure:
     for ax, framing in zip(panels, framings, strict=True):
         for row in found[found.framing == framing].itertuples():
             _interval(ax, row.score, row.low, row.high, techniques.index(row.technique))
-        ax.set_title(figures._cut(codebook.framing_label(framing), 24), loc="left")
-        ax.set_yticks(range(len(labels)), labels)
+        ax.set_title(figures._wrapped(codebook.framing_label(framing), 28), loc="left", size=8)
+        ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
         ax.set_xlim(left=0)
         ax.xaxis.set_major_locator(MaxNLocator(4, integer=True))
@@ -458,21 +533,24 @@ def _scores(found: pd.DataFrame, codebook: Codebook) -> Figure:
 
 
 def draw_agreement(
-    agreement: pd.DataFrame, codebook: Codebook, simulated: bool = False
-) -> Picture | None:
+    agreement: pd.DataFrame, codebook: Codebook, simulated: bool = False, level: float = 95
+) -> list[Picture]:
     """Consistency within and agreement between people, framing by framing."""
     found = agreement[agreement.statistic.isin(DRAWN) & agreement.value.notna()]
     if found.empty:
-        return None
-    return figures._picture(
+        return []
+    statistics = [name for name in DRAWN if name in set(found.statistic)]
+    height = 0.62 + 0.32 * found.framing.nunique()
+    return figures._paged(
         "agreement",
         "Consistency and agreement",
         "1 is perfect. For zeta 0 is as many circular triads as there can be, for u and "
         "alpha 0 is what chance gives. "
-        "Lines are intervals where there are any.",
-        "; ".join(
+        f"Lines are intervals at {level:g} % where there are any.",
+        figures._chunks(statistics, 3 * figures._rows_that_fit(height)),
+        lambda page: "; ".join(
             f"{framing_label(codebook, row.framing)}: {DRAWN[row.statistic]} {row.value:z.2f}"
-            for row in found.itertuples()
+            for row in found[found.statistic.isin(page)].itertuples()
         ),
         _agreement,
         found,
@@ -481,11 +559,8 @@ def draw_agreement(
     )
 
 
-def _agreement(found: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings, statistics = (
-        list(dict.fromkeys(found.framing)),
-        [name for name in DRAWN if name in set(found.statistic)],
-    )
+def _agreement(statistics: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
+    framings = list(dict.fromkeys(found.framing))
     labels = [figures._wrapped(framing_label(codebook, name), 16) for name in framings]
     figure, panels = figures._panels(
         len(statistics), 3, 0.62 + figures._row_in(labels) * len(labels), sharex=True, sharey=True
@@ -494,8 +569,8 @@ def _agreement(found: pd.DataFrame, codebook: Codebook) -> Figure:
         for row in found[found.statistic == statistic].itertuples():
             _interval(ax, row.value, row.low, row.high, framings.index(row.framing))
         ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
-        ax.set_title(figures._wrapped(DRAWN[statistic], 32), loc="left", size=8)
-        ax.set_yticks(range(len(labels)), labels)
+        ax.set_title(figures._wrapped(DRAWN[statistic], 30), loc="left", size=8)
+        ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
         ax.set_xlim(min(-0.1, float(np.nanmin(found[["value", "low"]].to_numpy())) - 0.05), 1.05)
         ax.tick_params(labelbottom=True)
@@ -572,25 +647,28 @@ def _participants(participants: pd.DataFrame) -> Figure:
 
 
 def draw_objective(
-    table: pd.DataFrame, measure: str, about: str, codebook: Codebook, simulated: bool = False
-) -> Picture:
+    table: pd.DataFrame,
+    measure: str,
+    about: str,
+    codebook: Codebook,
+    simulated: bool = False,
+    level: float = 95,
+) -> list[Picture]:
     """Worth against one objective measure, with the Pareto front where less of it is better.
 
     table: see `objective.against_worth`.
     """
-    return figures._picture(
+    framings = list(dict.fromkeys(table.framing))
+    return figures._paged(
         f"objective_{measure}",
         f"Worth against {about}",
-        "Thurstone case V worth with its interval. Ringed and joined: the Pareto front, "
-        "techniques that no other one beats in worth "
-        f"without having more {about}.",
-        "; ".join(
-            (
-                f"{framing_label(codebook, row.framing)}, {codebook.label(row.technique)}: "
-                f"{row.value:g}, {row.estimate:z.2f} JOD"
-            )
-            + (", on the front" if row.front else "")
-            for row in table.itertuples()
+        f"Thurstone case V worth with its interval at {level:g} %. Ringed and joined: the Pareto "
+        f"front, techniques that no other one beats in worth without having more {about}.",
+        figures._chunks(framings, 3 * figures._rows_that_fit(2.3, 0.2)),
+        lambda page: "; ".join(
+            f"{framing_label(codebook, row.framing)}, {codebook.label(row.technique)}: "
+            f"{row.value:g}, {row.estimate:z.2f} JOD" + (", on the front" if row.front else "")
+            for row in table[table.framing.isin(page)].itertuples()
         ),
         _objective,
         table,
@@ -600,8 +678,7 @@ def draw_objective(
     )
 
 
-def _objective(table: pd.DataFrame, about: str, codebook: Codebook) -> Figure:
-    framings = list(dict.fromkeys(table.framing))
+def _objective(framings: list[str], table: pd.DataFrame, about: str, codebook: Codebook) -> Figure:
     figure, panels = figures._panels(len(framings), 3, 2.3, below_in=0.2, sharey=True)
     room = max(float(table.value.max()), 1e-12)
     ends = table[["low", "high", "estimate"]].to_numpy()

@@ -6,6 +6,7 @@ people       tests of one number a person, or of counts of people: signed ranks,
 pairs        every pair, with the verdict that the report draws
 contrasts    differences of worths from all answers of a framing
 omnibus      any difference at all, additivity, interaction of technique and framing
+images       whether a difference holds for other images
 order        fatigue, and what the question before does
 trend, familiarity
 
@@ -14,6 +15,7 @@ All differences point the same way: positive is for b.
 
 from analysis.inference.contrasts import contrasts, linear_contrasts
 from analysis.inference.familiarity import familiarity_interaction, net_scores
+from analysis.inference.images import by_images
 from analysis.inference.omnibus import omnibus
 from analysis.inference.order import order_effects
 from analysis.inference.pairs import PAIRS, pairs, preferences, simultaneous, verdict
@@ -32,6 +34,7 @@ __all__ = [
     "EXACT_PEOPLE",
     "PAIRS",
     "alpha_of",
+    "by_images",
     "contrasts",
     "equivalence",
     "familiarity_interaction",

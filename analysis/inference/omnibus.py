@@ -4,7 +4,7 @@ techniques    whether any technique is preferred to another on average: each per
               every technique, against none
 additivity    whether worths add up: what is left of each person's answers when the differences of
               worths that fit them best are taken off; a small p says that no scale of worths
-              describes the pairs, whatever its link
+              describes the pairs, whatever its link; over all framings, of a person's means
 interaction   whether the order of techniques changes from framing to framing: each person's net
               points at each framing less their mean over framings
 
@@ -17,11 +17,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from analysis.inference.contrasts import ends
+from analysis.inference.pairs import preferences
 from analysis.inference.people import sign_flip
 from analysis.options import FEWEST_PEOPLE, OVERALL, Options
 from analysis.panel import Panel, panels, with_notes
 from analysis.responses import Responses
+from analysis.worth.binary import differences
 
 
 def omnibus(responses: Responses, options: Options) -> pd.DataFrame:
@@ -67,14 +68,17 @@ def _net(panel: Panel) -> np.ndarray:
 
 
 def _unexplained(panel: Panel) -> np.ndarray:
-    """(P, K): each person's answers less the differences of worths that fit them best."""
-    x = ends(panel)
-    given = np.where(panel.answered, panel.preference, 0).astype(float)
-    whole = panel.answered.all(axis=1)
+    """(P, pairs): each person's answers, the mean where asked about a pair several times, less the
+    differences of worths that fit them best.
+    """
+    x = differences(len(panel.items))
+    given = preferences(panel)
+    known = np.isfinite(given)
     left = np.zeros(given.shape)
+    whole = known.all(axis=1)
     left[whole] = given[whole] - given[whole] @ (x @ np.linalg.pinv(x))
-    for row in np.flatnonzero(~whole & panel.answered.any(axis=1)):
-        here = panel.answered[row]
+    for row in np.flatnonzero(~whole & known.any(axis=1)):
+        here = known[row]
         left[row, here] = given[row, here] - given[row, here] @ (x[here] @ np.linalg.pinv(x[here]))
     return left
 

@@ -146,7 +146,7 @@ def _of_panel(name: str, panel: Panel, options: Options) -> tuple[list[tuple], l
         elif options.margin is not None and np.isnan(tost_p):
             notes.append(f"{pair}: all {len(mine)} preferences are alike, no test of equivalence")
         inside = within(*inner, options.margin)
-        equal = inside if np.isnan(inside) else float(inside and tost_p < alpha)
+        equal = np.nan if options.margin is None else float(inside == 1 and tost_p < alpha)
         spread = mine.std(ddof=1) if len(mine) > 1 else 0.0
         difference, drawn = jod[j] - jod[i], jod_draws[:, j] - jod_draws[:, i]
         error = 0.0

@@ -1,6 +1,7 @@
 """`subdermal analyse`: from a table of answers to tables, figures and a report."""
 
 import shlex
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -186,6 +187,7 @@ def command(
         chosen,
         _source(declared, choices),
         read_measures(manifest, reference, factor or FRAMING) if manifest else None,
+        _progress,
     )
     write_files(files, out)
 
@@ -203,6 +205,13 @@ def command(
             else ""
         )
     )
+
+
+def _progress(steps: Iterable) -> Iterable:
+    """A bar of the tables on the terminal, where they take more than two seconds."""
+    from tqdm import tqdm
+
+    return tqdm(steps, desc="tables", unit="table", delay=2, leave=False, disable=None)
 
 
 def _source(declared: dict, choices: dict) -> str:

@@ -21,7 +21,8 @@ COLUMNS = {
     "pair_medians": "framing,a,b,n,median_preference,low,high",
     "ahp_intervals": "framing,aggregation,method,technique,priority,low,high",
     "ahp_consistency": (
-        "framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,judgement,consistent"
+        "framing,aggregation,ci,ci_low,ci_high,cr,cr_low,cr_high,a,b,judgement,consistent,"
+        "chance_cr,chance_share"
     ),
     "worths": "framing,model,technique,estimate,low,high,fit",
     "worth_models": "framing,model,parameter,estimate,low,high",
@@ -29,6 +30,7 @@ COLUMNS = {
     "pairs": ",".join(PAIRS),
     "contrasts": "framing,a,b,estimate,low,high,p,holm_p",
     "omnibus": "framing,question,people,size,p",
+    "by_images": "a,b,images,mean_preference,low,high,p,holm_p,least,most",
     "trend": "statistic,value,low,high,p",
     "order_effects": "statistic,people,value,low,high,p",
     "agreement": "framing,statistic,value,low,high,p",

@@ -192,7 +192,7 @@ def test_methods_name_every_choice_seed_version_and_source(study_report):
         assert (SIMULATED in text) == simulated and ("SIMULATED participants" in text) == simulated
         for version in ("numpy", "scipy", "pandas", "matplotlib", "typst", "subdermal", "Python"):
             assert re.search(rf"{version} \d", text)
-        cited = set(re.findall(r"\[([a-z]+\d{4})\]", text.split("## References")[0]))
+        cited = set(methods.keys_in(text.split("## References")[0]))
         listed = set(re.findall(r"^- \[([a-z]+\d{4})\]", text, re.MULTILINE))
         assert cited == listed and cited <= set(methods.REFERENCES)
 
@@ -448,8 +448,11 @@ def test_pairs_are_drawn_on_their_side_with_the_margin():
         "high": 1.5,
         "equivalence_low": 0.9,
         "equivalence_high": 1.4,
+        "simultaneous_low": 0.5,
+        "simultaneous_high": 1.9,
     }
-    axes = worth_figures._pairs(pd.DataFrame([row | {"verdict": "different"}]), book, 0.25).axes
+    table = pd.DataFrame([row | {"verdict": "different"}])
+    axes = worth_figures._pairs((["x"], [("a", "b")]), table, book, 0.25).axes
     dot = next(line for line in axes[0].lines if line.get_marker() == "o")
     assert dot.get_xdata()[0] == 1.2
     band = axes[0].patches[0]

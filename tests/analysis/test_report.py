@@ -63,6 +63,7 @@ TABLES = (
             "goodness",
             "contrasts",
             "omnibus",
+            "by_images",
             "order_effects",
             "familiarity_interaction",
         ),
