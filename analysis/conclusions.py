@@ -347,6 +347,8 @@ def _about_order(found: Conclusions, tables: Mapping[str, pd.DataFrame], alpha: 
 def _images(codebook: Codebook) -> str:
     """For which images answers speak: what was varied, and that the rest was not."""
     varied = [name.replace("_", " ") for name in codebook.factors]
+    if codebook.factor not in (FRAMING, *codebook.factors):
+        return "for the images that were shown"
     if len(codebook.framings) > 1 and codebook.factor == FRAMING:
         varied = ["framing", *varied]
     if not varied:

@@ -236,7 +236,8 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             "rank-biserial correlation [kerby2014] and the standardised mean difference. Beside "
             "the tests of single pairs, which decide, stand contrasts of a linear model of all "
             "answers with people as clusters [liang1986], tests by sign flips of people of any "
-            f"difference at all, of additivity and of an interaction of technique and {codebook.level}, and "
+            "difference at all, of additivity and of an interaction of technique and "
+            f"{codebook.level}, and "
             "t tests over the kinds of images, taken as a sample [clark1973].",
         ),
         ("Equivalence", _equivalence(options, alpha, declared)),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -150,6 +150,7 @@ def read_responses(
     codebook: Codebook | None = None,
     order: Iterable[str] | None = None,
     factor: str = FRAMING,
+    varied: Iterable[str] = (),
 ) -> Responses:
     """Read responses.csv, in any dialect that `analysis.delimited` knows.
 
@@ -160,18 +161,24 @@ def read_responses(
     that answers are grouped by, everywhere that a framing is meant without it: every table keeps
     its columns, and
         `framing` holds the factor's level. Which answers are duplicates depends on it: one pair at
-        one framing counts once a level.
+        one framing counts once a level. varied: columns that tell images apart beside framing,
+        where no codebook says which do.
     """
     _allowed(factor)
+    for column in varied:
+        _allowed(column)
     path = Path(path)
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    further = codebook.factors if codebook else ()
+    further = (codebook.factors if codebook else ()) or tuple(varied)
     raw, lines, findings, dialect = _parse(str(path), data, factor, further)
+    absent = [column for column in varied if column not in raw]
+    if absent:
+        raise InputError(f"{path}: {_lacking(absent[0], dialect.header)}")
     digest = hashlib.sha256(data).hexdigest()
-    return _tidy(str(path), raw, lines, findings, codebook, order, factor, digest, dialect)
+    return _tidy(str(path), raw, lines, findings, codebook, order, factor, digest, dialect, further)
 
 
 def responses_from_records(
@@ -261,6 +268,7 @@ def _tidy(
     factor: str,
     sha256: str,
     dialect: delimited.Rows | None = None,
+    further: tuple[str, ...] = (),
 ) -> Responses:
     rows = len(raw) + len(findings)
     columns = tuple(column for column in MEASURED if column not in raw)
@@ -275,7 +283,7 @@ def _tidy(
         for at in sorted(reasons)
     ]
     raw["image"] = raw.framing
-    for column in codebook.factors if codebook else ():
+    for column in further or (codebook.factors if codebook else ()):
         if column in raw:
             raw["image"] = raw.image + "." + raw[column]
     frame = (
@@ -291,6 +299,7 @@ def _tidy(
         codebook = codebooks.from_table(
             frame.framing, frame[["left", "right"]].to_numpy().ravel(), ratings
         )
+        codebook = replace(codebook, factors=further)
     if order is not None:
         present = set(frame.left) | set(frame.right)
         codebook = codebook.ordered(
@@ -353,6 +362,7 @@ def _tidy(
             *(dialect.notes if dialect else ()),
             *([f"Understood in it: {'; '.join(understood)}."] if understood else []),
             *_missing_notes(missing, columns, len(frame)),
+            *_crossed_note(int(again.sum()), rows, dialect, further, factor),
             *_notes(frame, raw, codebook),
         ),
         grouping=grouping,
@@ -568,6 +578,23 @@ def _without_level(
         for row in frame[rated.isna()].itertuples()
     ]
     return frame[rated.notna()], rated[rated.notna()], unrated
+
+
+def _crossed_note(
+    duplicates: int,
+    rows: int,
+    dialect: delimited.Rows | None,
+    further: tuple[str, ...],
+    factor: str,
+) -> Iterable[str]:
+    """A hint where many rows look like duplicates and other columns might tell them apart."""
+    known = {*REQUIRED, *OPTIONAL, *further, factor}
+    others = [name for name in dialect.header if name not in known] if dialect else []
+    if duplicates > rows / 20 and others:
+        yield (
+            f"{duplicates} of {rows} rows ask a question again and are not counted. If a column "
+            f"tells images apart ({_some(others)}), name it: --varied, or the study's manifest."
+        )
 
 
 def _missing_notes(missing: list[Missing], columns: tuple[str, ...], answers: int) -> Iterable[str]:

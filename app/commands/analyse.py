@@ -71,6 +71,15 @@ def names(
     ),
 )
 @click.option(
+    "--varied",
+    callback=names,
+    metavar="A,B",
+    help=(
+        "Columns that tell images apart beside framing, such as person,light. Without it those "
+        "of the study's manifest."
+    ),
+)
+@click.option(
     "--reference",
     default="reference",
     show_default=True,
@@ -123,6 +132,7 @@ def command(
     study: Path | None,
     matrices: Path | None,
     factor: str | None,
+    varied: tuple[str, ...] | None,
     reference: str,
     **choices: object,
 ) -> None:
@@ -143,6 +153,7 @@ def command(
     if matrices is not None:
         given = {f"--{name.replace('_', '-')}": value for name, value in choices.items()}
         given = {"--order": order, "--pair": pair, "--study": study, "--factor": factor, **given}
+        given |= {"--varied": varied}
         unused = [option for option, value in given.items() if value is not None]
         if unused:
             raise click.UsageError(
@@ -163,11 +174,11 @@ def command(
             notes = ("The manifest.json beside the table is not one of a study; it was not used.",)
     manifest = open_manifest(study) if study is not None else None
     codebook = read_manifest(manifest) if manifest else None
-    answers = read_responses(responses, codebook, order, factor or FRAMING)
+    answers = read_responses(responses, codebook, order, factor or FRAMING, varied or ())
     answers = replace(answers, notes=notes + answers.notes)
     options = [
         (option, ",".join(value))
-        for option, value in (("--order", order), ("--pair", pair))
+        for option, value in (("--order", order), ("--pair", pair), ("--varied", varied))
         if value
     ]
     options += [("--factor", factor)] if factor else []

@@ -372,3 +372,22 @@ def test_the_command_takes_a_factor(write, lit, tmp_path, undrawn):
         command, ["--matrices", "x.toml", "--factor", "lighting", "--out", str(tmp_path / "out")]
     )
     assert done.exit_code == 2 and "--factor cannot go with --matrices" in done.output
+
+
+def test_columns_that_tell_images_apart_keep_every_answer(write, answer):
+    """A crossed table without a manifest: half of it looked like duplicates."""
+    rows = [
+        answer(f"P{k}", "close-up", "a", "b", (-1) ** k) + f",{person},{light}"
+        for k in range(8)
+        for person in ("man", "woman")
+        for light in ("sun", "studio")
+    ]
+    path = write(rows, HEADER + ",person,light")
+    lost = read_responses(path)
+    assert len(lost.frame) == 8 and any("--varied" in note for note in lost.notes)
+    whole = read_responses(path, varied=("person", "light"))
+    assert len(whole.frame) == 32 and not whole.findings
+    by_person = read_responses(path, factor="person", varied=("person", "light"))
+    assert len(by_person.frame) == 32 and by_person.codebook.framings == ("man", "woman")
+    with pytest.raises(InputError, match="has no column 'skin'"):
+        read_responses(path, varied=("skin",))
