@@ -43,22 +43,22 @@ class Codebook:
     factors: tuple[str, ...] = ()
 
     @property
-    def spoken(self) -> str:
+    def factor_words(self) -> str:
         """The factor in words."""
         return self.factor.replace("_", " ")
 
     @property
     def heading(self) -> str:
-        return self.spoken[:1].upper() + self.spoken[1:]
+        return self.factor_words[:1].upper() + self.factor_words[1:]
 
     @property
     def level(self) -> str:
         """What one group of answers is called: 'framing', or 'level of lighting'."""
-        return FRAMING if self.factor == FRAMING else f"level of {self.spoken}"
+        return FRAMING if self.factor == FRAMING else f"level of {self.factor_words}"
 
     @property
     def levels(self) -> str:
-        return "framings" if self.factor == FRAMING else f"levels of {self.spoken}"
+        return "framings" if self.factor == FRAMING else f"levels of {self.factor_words}"
 
     def counted(self, number: int) -> str:
         """'3 framings', '1 level of lighting'."""
@@ -68,7 +68,7 @@ class Codebook:
         """The same study with the levels of another factor in the place of its framings: 'day', but
         '3 (familiarity)' for a number.
         """
-        levels, spoken = tuple(levels), factor.replace("_", " ")
+        levels, words = tuple(levels), factor.replace("_", " ")
         order = [level for key, level in self.labels if key == factor]
         if set(levels) <= set(order):
             levels = tuple(level for level in order if level in levels)
@@ -76,7 +76,7 @@ class Codebook:
         labels = {key: label for key, label in self.labels.items() if key[0] != "framing"}
         declared = {level: label for (key, level), label in self.labels.items() if key == factor}
         labels |= {
-            ("framing", level): declared.get(level, f"{level} ({spoken})")
+            ("framing", level): declared.get(level, f"{level} ({words})")
             for level in levels
             if level in declared or not any(map(str.isalpha, level))
         }

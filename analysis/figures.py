@@ -608,7 +608,7 @@ def draw_responses(
             _total_by_distance,
             totals,
             framings,
-            "framing, from near to far" if codebook.near_to_far else codebook.spoken,
+            "framing, from near to far" if codebook.near_to_far else codebook.factor_words,
             line,
             simulated=simulated,
         )

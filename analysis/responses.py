@@ -429,7 +429,7 @@ def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
     holds = (
         "" if codebook.factor == FRAMING else "; the column framing of every table holds its levels"
     )
-    yield f"Answers are grouped by {codebook.spoken} ({sizes}){holds}."
+    yield f"Answers are grouped by {codebook.factor_words} ({sizes}){holds}."
     if len(held) == 1:
         yield f"There is one {codebook.level}: nothing is compared over it."
     few = [codebook.framing_label(level) for level in held.index[held.people < FEWEST_PEOPLE]]

@@ -226,11 +226,7 @@ def test_other_sides_orders_and_twice_the_people(three, table):
 
 def test_few_people_and_missing_answers(crowd, table):
     found = pairs(table(crowd(4, [0, 1, 2], seed=1)), replace(FAST, margin=0.5))
-    assert (
-        found[["wilcoxon_p", "sign_p", "holm_p", "tost_p", "low", "high"]]
-        .isna()
-        .all(axis=None)
-    )
+    assert found[["wilcoxon_p", "sign_p", "holm_p", "tost_p", "low", "high"]].isna().all(axis=None)
     assert (found.equivalent == 0).all()
     assert found.mean_preference.notna().all() and any(
         "4 participants, no test" in note for note in found.attrs["notes"]
