@@ -137,7 +137,7 @@ def report_responses(
         *([("Simulated", [SIMULATED_SENTENCE])] if simulated else []),
         ("What can be concluded", concluded.can),
         ("What cannot be concluded", concluded.cannot),
-        ("What was counted", counted),
+        ("What was counted", [*counted, *_not_drawn(responses)]),
         *([("Cost and fidelity beside worth", said)] if said else []),
     ]
     text = methods.paragraphs(responses, options, declared)
@@ -547,6 +547,17 @@ def _summary(
         f"{_count(sides.none.sum(), 'time')}."
     )
     return sentences
+
+
+def _not_drawn(responses: Responses) -> list[str]:
+    """Figures that are left out for want of room, in a sentence."""
+    present = {name for items in responses.items.values() for name in items}
+    if len(present) <= figures.MOST_PREFERENCES:
+        return []
+    return [
+        f"With {len(present)} techniques the answers of each against each other one are not drawn; "
+        "tables/distributions.csv has them, and the figure of every difference their means."
+    ]
 
 
 def _missing(responses: Responses) -> str:
