@@ -21,7 +21,7 @@ from renderer.scene import graph as graphs
 from renderer.scene.camera import Camera
 from renderer.scene.picture import Picture
 from renderer.scene.view import View, main_camera, resolve
-from renderer.techniques.base import Inputs, Technique
+from renderer.techniques.base import Inputs, Room, Technique
 from renderer.techniques.screen import output_formats
 
 SHADOW_MAP = 4096
@@ -277,6 +277,14 @@ class Frame:
             self.view.pixels_per_mm,
             r.supersample,
             r.surfaces.curve(medium),
+            Room(
+                tuple(drawn for drawn in r.surfaces.surfaces if drawn.id == medium),
+                medium,
+                r.placed,
+                r.surfaces.points,
+                self._shared,
+                self.surface,
+            ),
         )
 
     def scatter(self, technique: Technique) -> gl.Target:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from renderer.errors import InputError
 from renderer.techniques.base import Technique
+from renderer.techniques.deon_luebke import DeonLuebke
 from renderer.techniques.golubev import Golubev
 from renderer.techniques.golubev_plus import GolubevPlus
 from renderer.techniques.jimenez_gaussian import JimenezGaussian
@@ -19,6 +20,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "jimenez_separable": JimenezSeparable,
     "golubev": Golubev,
     "golubev_plus": GolubevPlus,
+    "deon_luebke": DeonLuebke,
 }
 
 

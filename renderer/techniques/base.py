@@ -12,7 +12,10 @@ from renderer.optics.curve import Curve, edge_error
 from renderer.parameters import Parameters, parameter
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from renderer import gl
+    from renderer.passes.surfaces import Drawn
 
 
 @dataclass(frozen=True)
@@ -22,7 +25,8 @@ class Inputs:
     irradiance: RGBA32F, rgb = E, alpha = 1 where the medium at hand scatters. depth_normal:
     RGBA32F, x = view depth in mm (0 where nothing is), yzw = view-space normal. pixels_per_mm:
     pixels of this resolution per mm at 1 mm distance. supersample: pixels of this resolution per
-    output pixel, along one side. curve: the medium's reference curve.
+    output pixel, along one side. curve: the medium's reference curve. room: the surfaces of the
+    medium themselves, for techniques that work over another domain than the screen.
     """
 
     context: object
@@ -34,6 +38,25 @@ class Inputs:
     pixels_per_mm: float
     supersample: int
     curve: Curve
+    room: Room | None = None
+
+
+@dataclass(frozen=True)
+class Room:
+    """Where a medium's surfaces are, and their light over their atlases or at points on them.
+
+    surfaces: those of the medium at hand; medium: its id. placed(drawn, domain, size, mesh,
+    point_mm): a surface's light over "ATLAS" or "POINTS", see Renderer.placed. points(drawn, faces,
+    weights): a mesh of points on it. camera: the uniforms camera_position, view and projection;
+    depth: the target whose depth buffer holds what is seen.
+    """
+
+    surfaces: tuple[Drawn, ...]
+    medium: int
+    placed: Callable[..., gl.Target]
+    points: Callable[..., gl.Mesh]
+    camera: dict[str, Any]
+    depth: gl.Target
 
 
 @dataclass(frozen=True)
@@ -71,6 +94,8 @@ class Technique(Parameters):
     )
 
     measures_contrast: ClassVar[bool] = False
+    #: What it filters: the picture ("screen"), texture atlases ("atlas"), points ("points").
+    domain: ClassVar[str] = "screen"
 
     @classmethod
     def where(cls, field: str) -> str:

@@ -18,15 +18,8 @@ from renderer.gl import GL
 from renderer.optics import fits
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
+from renderer.techniques.cascade import TAPS, TAPS_VARIANCE, steps
 from renderer.techniques.screen import Canvas, ScreenTechnique
-
-TAPS = np.array(
-    [0.006, 0.061, 0.242, 0.382, 0.242, 0.061, 0.006]
-)  # at -3..3 sigma; the paper's shader
-TAPS_VARIANCE = float(
-    (TAPS * np.arange(-3, 4) ** 2).sum() / TAPS.sum()
-)  # 1.079 sigma^2: divided out below
-
 
 @dataclass(frozen=True)
 class JimenezGaussian(ScreenTechnique):
@@ -77,17 +70,15 @@ class JimenezGaussian(ScreenTechnique):
 
     def blurs(self, fit: fits.GaussianFit) -> list[tuple[float, np.ndarray]]:
         """(incremental sigma in mm, weight (3,)) of the Gaussians that are blurred."""
-        before = np.concatenate([[0.0], fit.variance_mm2[:-1]])
-        sigma = np.sqrt((fit.variance_mm2 - before) / TAPS_VARIANCE)
-        all_of_them = list(zip(sigma, fit.weights, strict=True))
+        all_of_them = steps(fit)
         return all_of_them if self.first == "blurred" else all_of_them[1:]
 
     def self_check(self, curve: Curve) -> None:
         fit = self.fit(curve)
         assert np.allclose(fit.weights.sum(axis=0), 1, atol=1e-9)
-        steps = [s**2 * TAPS_VARIANCE for s, _ in self.blurs(fit)]
+        variances = [s**2 * TAPS_VARIANCE for s, _ in self.blurs(fit)]
         skipped = 0.0 if self.first == "blurred" else fit.variance_mm2[0]
-        assert np.allclose(skipped + np.cumsum(steps), fit.variance_mm2[-len(steps) :])
+        assert np.allclose(skipped + np.cumsum(variances), fit.variance_mm2[-len(variances) :])
         assert np.allclose(TAPS, TAPS[::-1])
 
     def passes(self, canvas: Canvas) -> None:

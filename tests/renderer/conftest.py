@@ -26,6 +26,12 @@ def studio(model, **patch):
     return graph
 
 
+def small(name):
+    """A technique as it is, but for the size of its atlas."""
+    over_atlas = package.TECHNIQUES[name].domain == "atlas"
+    return package.make(name, {"size": 256} if over_atlas else {})
+
+
 MAN = Person.read(read_toml(PEOPLE / "man.toml"), "man")
 
 
@@ -58,7 +64,7 @@ def frames(drawing):
 
 @pytest.fixture(scope="session")
 def techniques():
-    return {name: package.make(name) for name in package.TECHNIQUES}
+    return {name: small(name) for name in package.TECHNIQUES}
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,13 @@
 """A flat slab under a straight edge of light: what a technique answers, in millimetres."""
 
+from dataclasses import replace
+
 import numpy as np
 
+import renderer
 from renderer import gl
 from renderer.techniques.base import Inputs
+from stimuli import scenes
 
 SIZE = (640, 360)
 
@@ -50,3 +54,69 @@ def rms(u, response, curve, reach_mm):
     near = np.abs(u) < reach_mm
     miss = (response - curve.edge(u))[near]
     return np.sqrt(np.trapezoid(miss**2, u[near], axis=0) / np.ptp(u[near]))
+
+
+def lit(frame, light, medium=1):
+    """What a technique over surfaces is given when their light is `light`, whatever the lamps are.
+
+    light: places (..., 3) in mm in the world -> irradiance (..., 3). Atlases and points get it.
+    """
+    inputs = frame.inputs(False, medium=medium)
+    room = inputs.room
+
+    def placed(*args, **options):
+        target = room.placed(*args, **options)
+        place, e = target.textures[5].read(), target.textures[0].read().copy()
+        e[..., :3] = light(place[..., :3])
+        height, width = e.shape[:2]
+        target.textures[0].delete()
+        target.textures[0] = gl.Texture(width, height, gl.GL.GL_RGBA32F, data=e[::-1])
+        dark = np.zeros((height, width, 4), np.float32)
+        target.textures[4].delete()
+        target.textures[4] = gl.Texture(width, height, gl.GL.GL_RGBA32F, data=dark)
+        return target
+
+    return replace(inputs, room=replace(room, placed=placed))
+
+
+def places(frame):
+    """Where the pixels' surfaces lie: (H, W, 3) mm in the world, and which scatter (H, W)."""
+    height, width = frame.height, frame.width
+    depth = frame.surface.textures[3].read()[..., 0]
+    x, y = (np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2
+    corners = np.stack([*np.meshgrid(x, y), np.ones((height, width))], axis=-1)
+    rays = corners @ frame.view.rays().T
+    return frame.view.eye + rays * depth[..., None], frame.surface.textures[0].read()[..., 3] > 0
+
+
+def surface_edge_response(technique, tilt_deg=0.0, size=(240, 60)):
+    """As `edge_response`, for a technique over the surfaces of a scene: a slab of 24 mm."""
+    turn = np.radians(tilt_deg)
+    along, normal = np.array([[np.cos(turn), 0.0, -np.sin(turn)], [np.sin(turn), 0.0, np.cos(turn)]])
+    slab = {"shape": "slab", "size_mm": [24.0, 24.0, 20.0], "rotation_deg": [0.0, tilt_deg, 0.0]}
+    table = {
+        "objects": {"slab": slab},
+        "materials": {"slab": {"medium": "deon_luebke", "albedo": [1.0, 1.0, 1.0]}},
+        "environment": {"ambient": [1.0, 1.0, 1.0]},
+        "camera": {
+            "framing": "slab",
+            "height_mm": 5.0,
+            "angle": "front",
+            "target_mm": (10.0 * normal).tolist(),
+        },
+    }
+
+    def edge(place):  # a ramp as wide as a texel of 1024 of the slab's atlas
+        share = np.clip(0.5 - place @ along / 0.073, 0, 1)
+        return np.repeat(share[..., None], 3, axis=-1)
+
+    graph = scenes.stage(scenes.read_scene(table)).graph
+    with renderer.Renderer(graph, size, 1, rays=8, shadow_map=64) as drawing:
+        with drawing.frame() as frame:
+            with technique.scatter(lit(frame, edge)).target as target:
+                got = target.textures[0].read()[..., :3].astype(float)
+            where, _ = places(frame)
+    rows = got[10:-10]
+    u = (where @ along)[size[1] // 2]
+    near = np.abs(u) < 8.0
+    return u[near], rows.mean(axis=0)[near], rows.std(axis=0)[near] / np.sqrt(len(rows))

@@ -21,6 +21,7 @@ from renderer.scene import (
 )
 from renderer.scene.graph import SceneGraph
 from stimuli import scenes
+from tests.renderer.conftest import small
 
 FIVE = {
     "sun": DistantLight((1.5, 1.4, 1.2), direction=(-0.5, 0.6, 0.7), radius_deg=1.0),
@@ -58,7 +59,7 @@ def drawn(scene_table, techniques, size=(128, 96)):
     with renderer.Renderer(staged.graph, **options) as drawing, drawing.frame(CAMERA) as frame:
         found = {"irradiance": frame.surface.textures[0].read().copy()}
         for name in techniques:
-            with frame.scatter(renderer.make(name)) as target:
+            with frame.scatter(small(name)) as target:
                 found[name] = target.textures[0].read()[..., :3].copy()
         return found
 
@@ -274,7 +275,9 @@ staged = scenes.stage(scenes.read_scene(scenes.load_table(sys.argv[1])))
 with renderer.Renderer(staged.graph, (96, 64), 2, rays=8, shadow_map=256) as drawing:
     with drawing.frame() as frame:
         for name in renderer.TECHNIQUES:
-            result = frame.render(renderer.make(name))
+            over_atlas = renderer.TECHNIQUES[name].domain == "atlas"
+            technique = renderer.make(name, {"size": 128} if over_atlas else {})
+            result = frame.render(technique)
             data = result.image.tobytes() + result.samples.tobytes()
             print(name, hashlib.sha256(data).hexdigest())
 """
