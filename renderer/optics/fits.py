@@ -13,7 +13,10 @@ import numpy as np
 
 from renderer.errors import InputError
 from renderer.optics import burley, gaussians
+from renderer.optics import curve as curves
 from renderer.optics.curve import Curve, edge_error
+from renderer.optics.dipole import pole
+from renderer.optics.fresnel import extrapolation
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,3 +121,85 @@ def burley_distance(curve: Curve) -> BurleyFit:
         distances.append(float(np.exp(found.x)))
     fit = BurleyFit(np.array(distances), np.zeros(curve.channels))
     return BurleyFit(fit.distance_mm, edge_error(curve, fit.edge))
+
+
+@dataclass(frozen=True, eq=False)
+class DipoleFit:
+    """Jensen et al. 2001's dipole, normalised: depths of the real and the virtual source.
+
+    real_mm, virtual_mm, sigma_tr (C,): mm, mm, 1/mm; error (C,): rms at a straight edge.
+    """
+
+    real_mm: np.ndarray
+    virtual_mm: np.ndarray
+    sigma_tr: np.ndarray
+    error: np.ndarray
+
+    def _total(self) -> np.ndarray:
+        depths = np.stack([self.real_mm, self.virtual_mm])
+        return 0.5 * np.exp(-self.sigma_tr * depths).sum(axis=0)
+
+    def density(self, r_mm) -> np.ndarray:
+        """Share of the light that leaves per mm2 at a radius: (N,) -> (N, C)."""
+        r = np.asarray(r_mm, float)[:, None]
+        total = pole(r, self.real_mm, self.sigma_tr) + pole(r, self.virtual_mm, self.sigma_tr)
+        return total / self._total()
+
+    def cdf(self, r_mm) -> np.ndarray:
+        """Share of the light that leaves within a radius: (N,) -> (N, C).
+
+        The flux of a pole at depth z through a disc is (exp(-s z) - z / d exp(-s d)) / 2.
+        """
+        r = np.asarray(r_mm, float)[:, None]
+        share = np.zeros((len(r), len(self.sigma_tr)))
+        for z in (self.real_mm, self.virtual_mm):
+            d = np.hypot(r, z)
+            share += 0.5 * (np.exp(-self.sigma_tr * z) - z / d * np.exp(-self.sigma_tr * d))
+        return share / self._total()
+
+    def curve(self) -> Curve:
+        """Its rings, which answer to edges."""
+        reach = float((self.virtual_mm + 12 / self.sigma_tr).max())
+        return curves.from_cdf("dipole", self.cdf, reach, float(self.real_mm.min()) / 40)
+
+    def edge(self, x_mm) -> np.ndarray:
+        """The answer to a straight edge: (N,) -> (N, C)."""
+        return self.curve().edge(x_mm)
+
+    def radius(self, share: float) -> np.ndarray:
+        """The radius that holds a share of the light: (C,) mm."""
+        r = np.geomspace(1e-3, (self.virtual_mm + 20 / self.sigma_tr).max(), 4000)
+        inside = self.cdf(r)
+        return np.array([np.interp(share, inside[:, c], r) for c in range(inside.shape[1])])
+
+
+#: (1 + F_dr) / (1 - F_dr) of a smooth face of index 1.4: where the virtual source of a fit lies.
+_EXTRAPOLATION = extrapolation(1.4)
+
+
+def _dipole(mfp_mm: np.ndarray, albedo: np.ndarray) -> DipoleFit:
+    """The dipole of reduced mean free paths and reduced albedos (C,) below an index of 1.4."""
+    mfp, sigma_tr = np.asarray(mfp_mm, float), np.sqrt(3 * (1 - albedo)) / mfp_mm
+    virtual = mfp * (1 + 4 * _EXTRAPOLATION / 3)
+    return DipoleFit(mfp, virtual, sigma_tr, np.zeros(len(mfp)))
+
+
+@lru_cache(maxsize=64)
+def dipole(curve: Curve) -> DipoleFit:
+    """The dipole of each channel nearest to a curve: mean free path and reduced albedo are free."""
+    from scipy.optimize import minimize
+
+    found = []
+    for c in range(curve.channels):
+        x = curve.positions(c, 121)
+        goal = curve.edge(x)[:, c]
+
+        def miss(p: np.ndarray, x=x, goal=goal) -> float:
+            one = _dipole(np.exp(p[:1]), 1 / (1 + np.exp(-p[1:])))
+            return float(np.trapezoid((one.edge(x)[:, 0] - goal) ** 2, x))
+
+        start = [np.log(0.5 * curve.mean_radius()[c]), 2.0]
+        found.append(minimize(miss, start, method="Nelder-Mead", options={"maxiter": 120}).x)
+    log_mfp, logit = np.transpose(found)
+    fit = _dipole(np.exp(log_mfp), 1 / (1 + np.exp(-logit)))
+    return DipoleFit(fit.real_mm, fit.virtual_mm, fit.sigma_tr, edge_error(curve, fit.edge))

@@ -13,6 +13,7 @@ from renderer.techniques.golubev_plus import GolubevPlus
 from renderer.techniques.jimenez_gaussian import JimenezGaussian
 from renderer.techniques.jimenez_separable import JimenezSeparable
 from renderer.techniques.none import NoScattering
+from renderer.techniques.splat_dipole import SplatDipole
 
 TECHNIQUES: dict[str, type[Technique]] = {
     "none": NoScattering,
@@ -21,6 +22,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "golubev": Golubev,
     "golubev_plus": GolubevPlus,
     "deon_luebke": DeonLuebke,
+    "splat_dipole": SplatDipole,
 }
 
 

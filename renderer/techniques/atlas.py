@@ -160,9 +160,7 @@ class AtlasTechnique(Technique):
             filtered = self.filter(atlas)
             if self.padding:
                 padded = atlas.target()
-                atlas.draw(
-                    padded, "techniques/atlas_pad.glsl", source=filtered, reach=self.padding
-                )
+                atlas.draw(padded, "techniques/atlas_pad.glsl", source=filtered, reach=self.padding)
                 filtered = padded.textures[0]
             result.bind(depth_test=True)
             GL.glDepthMask(False)
@@ -182,4 +180,3 @@ class AtlasTechnique(Technique):
     def stride(self) -> dict[str, Any]:
         """What every blur's shader is told of seams."""
         return {"stop": int(self.seams == "stop")}
-

@@ -21,6 +21,7 @@ from renderer.parameters import parameter
 from renderer.techniques.cascade import TAPS, TAPS_VARIANCE, steps
 from renderer.techniques.screen import Canvas, ScreenTechnique
 
+
 @dataclass(frozen=True)
 class JimenezGaussian(ScreenTechnique):
     """The 2009 filter.

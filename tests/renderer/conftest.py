@@ -27,9 +27,9 @@ def studio(model, **patch):
 
 
 def small(name):
-    """A technique as it is, but for the size of its atlas."""
-    over_atlas = package.TECHNIQUES[name].domain == "atlas"
-    return package.make(name, {"size": 256} if over_atlas else {})
+    """A technique as it is, but for the size of its atlas or the number of its points."""
+    fewer = {"atlas": {"size": 256}, "points": {"spacing_mm": 4.0}}
+    return package.make(name, fewer.get(package.TECHNIQUES[name].domain, {}))
 
 
 MAN = Person.read(read_toml(PEOPLE / "man.toml"), "man")

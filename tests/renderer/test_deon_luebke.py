@@ -47,7 +47,10 @@ def test_a_slab_answers_as_the_medium_whatever_its_tilt():
 def test_constant_light_stays_constant_to_the_silhouette(ball):
     light = np.array([2.0, 1.0, 0.5])
     given = lit(ball, lambda place: np.broadcast_to(light, place.shape))
-    for technique in (TECHNIQUE, renderer.make("deon_luebke", {"size": 256, "padding": 4, "texturing": 0.0})):
+    for technique in (
+        TECHNIQUE,
+        renderer.make("deon_luebke", {"size": 256, "padding": 4, "texturing": 0.0}),
+    ):
         with technique.scatter(given).target as target:
             got, count = (texture.read().copy() for texture in target.textures)
         _, scatters = places(ball)

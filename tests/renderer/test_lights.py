@@ -275,8 +275,8 @@ staged = scenes.stage(scenes.read_scene(scenes.load_table(sys.argv[1])))
 with renderer.Renderer(staged.graph, (96, 64), 2, rays=8, shadow_map=256) as drawing:
     with drawing.frame() as frame:
         for name in renderer.TECHNIQUES:
-            over_atlas = renderer.TECHNIQUES[name].domain == "atlas"
-            technique = renderer.make(name, {"size": 128} if over_atlas else {})
+            fewer = {"atlas": {"size": 128}, "points": {"spacing_mm": 4.0}}
+            technique = renderer.make(name, fewer.get(renderer.TECHNIQUES[name].domain, {}))
             result = frame.render(technique)
             data = result.image.tobytes() + result.samples.tobytes()
             print(name, hashlib.sha256(data).hexdigest())
