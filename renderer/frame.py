@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -166,12 +167,14 @@ class Renderer:
         size: tuple[int, int],
         mesh: gl.Mesh | None = None,
         point_mm: float = 1.0,
+        diffuse: str = "lambert",
     ) -> gl.Target:
         """A surface's light over its texture atlas ("ATLAS") or over points on it ("POINTS").
 
         size: (width, height) in texels; mesh: the points, from `surfaces.points`; point_mm: what a
-        point stands for, finer relief fades. The target has PLACED_FORMATS; the caller frees it.
-        Specular light is that towards the subject's front, and means nothing here.
+        point stands for, finer relief fades; diffuse: how light passes the face. The target has
+        PLACED_FORMATS; the caller frees it. Specular light, and Disney's diffuse, are those towards
+        the subject's front.
         """
         self.context.make_current()
         target = gl.Target(*size, list(PLACED_FORMATS), depth=domain == "ATLAS")
@@ -184,7 +187,9 @@ class Renderer:
             "point_mm": point_mm,
         }
         GL.glEnable(GL.GL_PROGRAM_POINT_SIZE)
-        self.surfaces.draw(self.program, self.lamps, self.surroundings, shared, domain, drawn, mesh)
+        self.surfaces.draw(
+            self.program, self.lamps, self.surroundings, shared, domain, drawn, mesh, diffuse
+        )
         return target
 
 
@@ -199,7 +204,8 @@ class Frame:
         self.renderer, self.view, self.picture = renderer, view, picture
         s = renderer.supersample
         self.width, self.height = renderer.size[0] * s, renderer.size[1] * s
-        self._given: dict[tuple[int, bool, float], gl.Target] = {}
+        self._given: dict[tuple[int, bool, float, str], gl.Target] = {}
+        self._shaded: dict[str, gl.Target] = {}
         self._shared = {
             "camera_position": view.eye,
             "view": view.view,
@@ -233,20 +239,40 @@ class Frame:
         for hair in r.hair:
             hair.draw(r.program, r.lamps, r.surroundings, self._shared, self.view.pixels_per_mm)
 
-    def irradiance(self, translucent: bool, medium: int = 1, texturing: float = 0.0) -> gl.Texture:
+    def _irradiance(self, diffuse: str) -> gl.Texture:
+        """Irradiance below a face of that model, alpha the medium's id."""
+        if diffuse == "lambert":
+            return self.surface.textures[0]
+        if diffuse not in self._shaded:
+            target = gl.Target(self.width, self.height, [GL.GL_RGBA32F], depth=self.surface)
+            target.bind(clear=(0.0, 0.0, 0.0, 0.0))
+            target.bind(depth_test=True)  # the depth is there already
+            r = self.renderer
+            r.surfaces.draw(r.program, r.lamps, r.surroundings, self._shared, diffuse=diffuse)
+            self._shaded[diffuse] = target
+        return self._shaded[diffuse].textures[0]
+
+    def irradiance(
+        self,
+        translucent: bool,
+        medium: int = 1,
+        texturing: float = 0.0,
+        diffuse: str = "lambert",
+    ) -> gl.Texture:
         """The input of the techniques: irradiance, alpha 1 where this medium scatters.
 
         translucent: with the transmitted light of Jimenez 2010 added; texturing: times the albedo
-        to this power, which the composite then leaves out.
+        to this power, which the composite then leaves out; diffuse: how light passes the face.
         """
+        below = self._irradiance(diffuse)
         if not translucent and not texturing and len(self.renderer.media) <= 1:
-            return self.surface.textures[0]
-        key = (medium, translucent, texturing)
+            return below
+        key = (medium, translucent, texturing, diffuse)
         if key not in self._given:
             target = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
             target.bind()
             self.renderer.program("passes/add.frag").use(
-                irradiance=self.surface.textures[0],
+                irradiance=below,
                 transmitted=self.surface.textures[4],
                 medium=float(medium),
                 through=float(translucent),
@@ -264,13 +290,14 @@ class Frame:
         depth_normal: gl.Texture | None = None,
         medium: int = 1,
         texturing: float = 0.0,
+        diffuse: str = "lambert",
     ) -> Inputs:
         """What a technique gets; the textures can be replaced (tests use a flat patch)."""
         r = self.renderer
         return Inputs(
             r.context,
             r.program,
-            irradiance or self.irradiance(translucent, medium, texturing),
+            irradiance or self.irradiance(translucent, medium, texturing, diffuse),
             depth_normal or self.surface.textures[3],
             self.width,
             self.height,
@@ -280,7 +307,7 @@ class Frame:
             Room(
                 tuple(drawn for drawn in r.surfaces.surfaces if drawn.id == medium),
                 medium,
-                r.placed,
+                partial(r.placed, diffuse=diffuse),
                 r.surfaces.points,
                 self._shared,
                 self.surface,
@@ -290,7 +317,7 @@ class Frame:
     def scatter(self, technique: Technique) -> gl.Target:
         """Scattered irradiance and counts of all media: one pass of the technique for each."""
         media = range(1, max(1, len(self.renderer.media)) + 1)
-        given = {"translucent": technique.translucent, "texturing": technique.texturing}
+        given = _light(technique)
         first = technique.scatter(self.inputs(**given, medium=1)).target
         if len(media) == 1:
             return first
@@ -331,6 +358,7 @@ class Frame:
                 r.surroundings,
                 r.supersample,
                 technique.texturing,
+                technique.diffuse == "conserving",
             )
             counts = info.read()
         contrast = counts[..., 1].copy() if technique.measures_contrast else None
@@ -346,7 +374,7 @@ class Frame:
         spent = {name: np.empty((rounds, 2)) for name in techniques}
         for k in range(-1, rounds):
             for name, technique in techniques.items():
-                self.irradiance(technique.translucent, texturing=technique.texturing)
+                self.inputs(**_light(technique))
                 gl.finish()
                 start = np.array([time.perf_counter(), time.process_time()])
                 scattered = self.scatter(technique)
@@ -359,6 +387,12 @@ class Frame:
     def close(self) -> None:
         """Free the shared buffers."""
         self.renderer.context.make_current()
-        for target in (*self._given.values(), self.hair, self.surface):
+        for target in (*self._given.values(), *self._shaded.values(), self.hair, self.surface):
             target.delete()
         self._given.clear()
+        self._shaded.clear()
+
+
+def _light(technique: Technique) -> dict:
+    """Which light a technique asks for."""
+    return {name: getattr(technique, name) for name in ("translucent", "texturing", "diffuse")}

@@ -135,9 +135,8 @@ def exit_weights(eta: float, fit: bool = True) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)
 def rough_directional_reflectance(mu_o: float, eta: float, roughness: float) -> float:
-    """rho(mu_o) = int f_r (n .
-
-    w_i) dw_i of Cook and Torrance's BRDF with Beckmann slopes, on the side eta says.
+    """rho(mu_o) = int f_r (n . w_i) dw_i of Cook and Torrance's BRDF with Beckmann slopes, on the
+    side that eta says.
 
     f_r = D F G / (4 (n.i)(n.o)), V-cavity G; the integral is over half vectors, drawn in strata of
     the Beckmann density D (n.h), so that D and 1/(4 (o.h)) cancel.

@@ -4,6 +4,7 @@
 in vec2 uv;
 uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albedo; uniform sampler2D depth_normal; uniform sampler2D hair;
 uniform float exposure;
+uniform float conserving;  // 1: what the face sends back inside does not get out
 uniform float texturing;  // the power of the albedo that is in the scattered light already
 uniform int tone_map; uniform int backdrop;  // places in the lists of renderer/scene/picture.py
 uniform mat3 rays;                           // normalised device coordinates to directions in the world
@@ -31,10 +32,11 @@ void main() {
     float depth = texelFetch(depth_normal, at, 0).x;
     vec3 radiance = behind();
     if (depth > 0.0) {
-        vec3 own = max(texelFetch(albedo, at, 0).rgb, 0.0);
+        vec4 face = texelFetch(albedo, at, 0);
+        vec3 own = max(face.rgb, 0.0);
         vec3 left = texturing == 0.0 ? own : pow(max(own, 1e-6), vec3(1.0 - texturing));
         vec4 light = texelFetch(scattered, at, 0);
-        radiance = (light.a > 0.5 ? left : own) * light.rgb / PI + texelFetch(specular, at, 0).rgb;
+        radiance = (light.a > 0.5 ? left : own) * mix(1.0, face.a, conserving) * light.rgb / PI + texelFetch(specular, at, 0).rgb;
     }
     vec4 strands = texelFetch(hair, at, 0);
     radiance = radiance * (1.0 - strands.a) + strands.rgb;

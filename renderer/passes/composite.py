@@ -24,10 +24,12 @@ def composite(
     surroundings: Surroundings,
     supersample: int,
     texturing: float = 0.0,
+    conserving: bool = False,
 ) -> np.ndarray:
     """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers.
 
-    texturing: the power of the albedo that scattered light has already been multiplied by.
+    texturing: the power of the albedo that scattered light has already been multiplied by;
+    conserving: the face holds back what it reflects inside.
     """
     width, height = surface.width, surface.height
     _, specular, albedo, depth_normal, _ = surface.textures
@@ -36,6 +38,7 @@ def composite(
         "specular": specular,
         "albedo": albedo,
         "texturing": texturing,
+        "conserving": float(conserving),
         "depth_normal": depth_normal,
         "hair": hair.textures[0],
         "exposure": picture.exposure,

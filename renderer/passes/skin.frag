@@ -2,6 +2,7 @@
 #include "shaders/common.glsl"
 #include "shaders/noise.glsl"
 #include "shaders/lighting.glsl"
+#include "shaders/diffuse.glsl"
 #include "passes/surface_out.glsl"
 uniform vec3 eye_l; uniform vec3 eye_r; uniform vec3 mouth; uniform vec3 nose;
 uniform int procedural;
@@ -154,6 +155,38 @@ vec3 transmitted(int lamp, vec3 p, vec3 n) {
     return total / 8.0 * clamp(transmission_wrap + dot(lamp_towards(lamp, p), -n), 0.0, 1.0) * lamp_light(lamp, p);
 }
 
+// The share of the light that the two lobes send back, of light from a direction or from everywhere.
+float sent_back(vec3 one, vec3 two) {
+    float back = mix(dot(vec2(f0, 1.0), one.xy), dot(vec2(f0, 1.0), two.xy), lobe_share);
+    return clamp(specular_strength * back, 0.0, 1.0);
+}
+float sent_back(float cosine, float m) {
+    return sent_back(face(cosine, m * lobe_roughness.x), face(cosine, min(m * lobe_roughness.y, 0.9)));
+}
+float sent_back_even(float m) {
+    return sent_back(face_even(m * lobe_roughness.x), face_even(min(m * lobe_roughness.y, 0.9)));
+}
+// What of a lamp's light goes in, and what of even light. Over an atlas or points nobody looks on.
+float goes_in(vec3 n, vec3 v, vec3 l, float m) {
+#if DIFFUSE == DISNEY
+    float lh = dot(l, normalize(l + v)), f90 = 0.5 + 2.0 * m * lh * lh;
+    return (1.0 + (f90 - 1.0) * pow(1.0 - dot(n, l), 5.0)) * (1.0 + (f90 - 1.0) * pow(1.0 - max(dot(n, v), 0.0), 5.0));
+#elif DIFFUSE == CONSERVING
+    return 1.0 - sent_back(dot(n, l), m);
+#else
+    return 1.0;
+#endif
+}
+float goes_in_even(float nv, float m) {
+#if DIFFUSE == DISNEY
+    return face(nv, m).z;
+#elif DIFFUSE == CONSERVING
+    return 1.0 - sent_back_even(m);
+#else
+    return 1.0;
+#endif
+}
+
 void main() {
     vec3 smooth_n = normalize(world_normal);
     vec3 v = normalize(camera_position - world);
@@ -192,6 +225,7 @@ void main() {
 
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
     vec3 irradiance = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
+    irradiance *= goes_in_even(max(dot(n, v), 0.02), m);
     vec3 specular = vec3(0.0), through = vec3(0.0);
     float wet = a.x;
     for (int k = 0; k < lamps; ++k) {
@@ -199,7 +233,7 @@ void main() {
         float nl = dot(n, l), geometric = dot(smooth_n, l);
         if (geometric > -0.08 && nl > 0.0) {
             vec3 e = lamp_light(k, world) * nl * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
-            irradiance += e;
+            irradiance += e * goes_in(n, v, l, m);
             float lobe = (1.0 - lobe_share) * kelemen(n, v, l, m * lobe_roughness.x, f0) + lobe_share * kelemen(n, v, l, min(m * lobe_roughness.y, 0.9), f0);
             specular += e * lobe * (1.0 - 0.5 * min(shade, 1.0)) * (1.0 - 0.85 * b.w);
         }
@@ -217,7 +251,7 @@ void main() {
     float mask = material_id * step(0.5, scatters);
     out_irradiance = vec4(irradiance * dark, mask);
     out_specular = vec4(specular_strength * specular, 1.0);
-    out_albedo = vec4(albedo, 1.0);
+    out_albedo = vec4(albedo, 1.0 - sent_back(nv, m));
     put_place(n);
     out_transmitted = vec4(mask > 0.0 ? through * (1.0 - b.w) : vec3(0.0), 1.0);
 }

@@ -2,7 +2,7 @@
 #include "passes/domain.glsl"
 layout(location = 0) out vec4 out_irradiance;    // rgb: E, alpha: the id of the material that scatters, 0 for none
 layout(location = 1) out vec4 out_specular;      // rgb: radiance added after scattering
-layout(location = 2) out vec4 out_albedo;        // rgb: diffuse albedo
+layout(location = 2) out vec4 out_albedo;        // rgb: diffuse albedo, alpha: the share of it that gets out, not sent back
 layout(location = 3) out vec4 out_depth_normal;  // screen: view depth in mm, normal in view space; else: normal in the world
 layout(location = 4) out vec4 out_transmitted;   // rgb: irradiance that comes through from behind
 #if DOMAIN != SCREEN

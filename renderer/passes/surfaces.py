@@ -13,7 +13,7 @@ import numpy as np
 
 from renderer import gl
 from renderer.gl import GL
-from renderer.optics import fits, media
+from renderer.optics import fits, media, surface
 from renderer.optics.curve import Curve
 from renderer.passes.bake import Baked, Body, bake
 from renderer.passes.environment import Surroundings
@@ -52,6 +52,9 @@ class Surfaces:
         self, found: Contents, lights: Sequence, surroundings: Surroundings, rays: int, seed: int
     ):
         self.seed = seed
+        table = surface.table()
+        height, width = table.shape[:2]
+        self.face = gl.Texture(width, height, GL.GL_RGBA32F, linear=True, data=table)
         items = [*found.surfaces, *found.eyes]
         bodies = [_body(item) for item in items]
         baked = bake(bodies, lights, surroundings.radiance, rays, seed) if bodies else []
@@ -104,15 +107,18 @@ class Surfaces:
         domain: str = "SCREEN",
         only: Drawn | None = None,
         mesh: gl.Mesh | None = None,
+        diffuse: str = "lambert",
     ) -> None:
         """Shade into the bound target: everything, or over a domain `only` one surface.
 
         shared: camera_position, view, projection (and points_size, point_mm for POINTS);
-        mesh: drawn in the place of the surface's own (points on it).
+        mesh: drawn in the place of the surface's own (points on it); diffuse: how light passes the
+        face (renderer.optics.surface).
         """
         defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": domain}
-        values = {**shared, **lamps.uniforms(), **surroundings.uniforms()}
-        program = programs("passes/skin.frag", defines, vertex="passes/surface.vert")
+        values = {**shared, **lamps.uniforms(), **surroundings.uniforms(), "face_table": self.face}
+        own = {**defines, "DIFFUSE": surface.DIFFUSE.index(diffuse)}
+        program = programs("passes/skin.frag", own, vertex="passes/surface.vert")
         for drawn in self.surfaces if only is None else [only]:
             program.use(**program.accepts({**values, **self._material(drawn)}))
             (mesh or drawn.mesh).draw()

@@ -9,6 +9,7 @@ import numpy as np
 
 from renderer.errors import InputError
 from renderer.optics.curve import Curve, edge_error
+from renderer.optics.surface import DIFFUSE
 from renderer.parameters import Parameters, parameter
 
 if TYPE_CHECKING:
@@ -76,7 +77,8 @@ class Technique(Parameters):
 
     translucent: light that comes through thin parts is added before scattering (Jimenez et al.
     2010). texturing: the share of the albedo's exponent that is applied before scattering: 0
-    post-scatter, 1 pre-scatter, 0.5 both. `measures_contrast`: it writes contrast. Kernels are
+    post-scatter, 1 pre-scatter, 0.5 both. diffuse: how light passes the rough face on its way in
+    and out. `measures_contrast`: it writes contrast. Kernels are
     fitted to the medium's curve: `edge` is what the kernel for a curve answers to a straight edge,
     and `fit_error` how far that is from the curve's own answer.
     """
@@ -91,6 +93,11 @@ class Technique(Parameters):
         low=0.0,
         high=1.0,
         source="d'Eon and Luebke 2007, sec. 14.4.5: post (0), pre (1), or both (0.5)",
+    )
+    diffuse: str = parameter(
+        "lambert",
+        choices=DIFFUSE,
+        source="how light passes the face, renderer/optics/surface.py: Lambert for all",
     )
 
     measures_contrast: ClassVar[bool] = False
