@@ -191,16 +191,21 @@ class Stack:
         return Stack(self.layers[::-1], self.n_below, self.n_above, name=self.name)
 
 
-def reach_mm(stack: Stack, channel: int | None = None) -> float:
-    """A radius that holds all but a thousandth of what a medium reflects: 12 diffuse mean free
-    paths of its most far-reaching layer and channel, and between 30 and 300 mean free paths.
+def reach(mfp, dmfp, thickness_mm: float) -> float:
+    """A radius that holds all but a thousandth of what a layer reflects, mm: 12 diffuse mean free
+    paths (or thicknesses of all layers, where that is less), and 30 to 300 mean free paths.
+
+    mfp, dmfp: (C,) or one, reduced and diffuse mean free paths in mm.
     """
+    mfp = np.asarray(mfp, float)
+    return float(np.clip(12 * np.minimum(dmfp, thickness_mm), 30 * mfp, 300 * mfp).max())
+
+
+def reach_mm(stack: Stack, channel: int | None = None) -> float:
+    """The `reach` of a stack's most far-reaching layer and channel."""
     pick = slice(None) if channel is None else slice(channel, channel + 1)
-    reach = 0.0
-    for layer in stack.layers:
-        mfp, dmfp = layer.medium.mfp[pick], layer.medium.dmfp[pick]
-        reach = max(reach, float(np.clip(12 * dmfp, 30 * mfp, 300 * mfp).max()))
-    return reach
+    media = [layer.medium for layer in stack.layers]
+    return max(reach(m.mfp[pick], m.dmfp[pick], stack.thickness_mm) for m in media)
 
 
 def finest_mm(stack: Stack, channel: int | None = None) -> float:

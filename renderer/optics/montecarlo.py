@@ -24,6 +24,7 @@ import numpy as np
 
 from renderer import caches
 from renderer.errors import InputError
+from renderer.optics.medium import reach
 
 BATCHES = 64
 CHUNK, CHUNK_S = (
@@ -364,19 +365,15 @@ def batch_sizes(photons: int) -> np.ndarray:
     return photons // BATCHES + (np.arange(BATCHES) < photons % BATCHES)
 
 
-def default_reach_mm(layers: Sequence[Layer]) -> float:
-    """A radius that holds nearly all of what comes back: 12 diffusion lengths, and 10 to 300
-    reduced mean free paths.
-    """
-    reach = []
+def _reach_mm(layers: Sequence[Layer]) -> float:
+    """A radius that holds nearly all of what comes back (renderer.optics.medium.reach)."""
+    thickness = sum(layer.d for layer in layers)
+    found = [1.0]
     for layer in layers:
         if mu_t := layer.mu_a + layer.mu_s * (1 - layer.g):
-            diffuse = min(
-                1 / math.sqrt(3 * layer.mu_a * mu_t) if layer.mu_a else math.inf,
-                sum(each.d for each in layers),
-            )
-            reach.append(min(max(12 * diffuse, 10 / mu_t), 300 / mu_t))
-    return max(reach, default=1.0)
+            diffuse = 1 / math.sqrt(3 * layer.mu_a * mu_t) if layer.mu_a else math.inf
+            found.append(reach(1 / mu_t, diffuse, thickness))
+    return max(found[1:], default=1.0)
 
 
 def cache_folder() -> Path:
@@ -405,11 +402,15 @@ def simulate(
     r_max_mm defaults to a radius that holds nearly all of the light.
 
     The result has, each with its standard error in NAME_error and as a share of the incident light:
-      specular: mirrored at the first face, or come back from further down without being scattered
-      diffuse_reflectance = single_reflectance + multiple_reflectance: left above, scattered once,
-      or more than once transmittance = ballistic + single_transmittance + multiple_transmittance:
-      left below; ballistic unscattered absorbed, absorbed_by_layer (L,); specular +
-      diffuse_reflectance + transmittance + absorbed = 1 to rounding
+
+    * specular: mirrored at the first face, or come back from further down without being scattered;
+    * diffuse_reflectance = single_reflectance + multiple_reflectance: left above, scattered once,
+      or more than once;
+    * transmittance = ballistic + single_transmittance + multiple_transmittance: left below;
+      ballistic is unscattered;
+    * absorbed, absorbed_by_layer (L,);
+    * specular + diffuse_reflectance + transmittance + absorbed = 1 to rounding,
+
     and curves of scattered light: R, R_single, R_multiple, T, ... in 1/mm^2 on rings r_mm, edges_mm
     (what left beyond the last ring is R_beyond, T_beyond: the curve times area_mm2 and this sum to
     the total), and R_angular, T_angular in 1/sr, radiance times cosine as in MCML, on bins of exit
@@ -426,14 +427,14 @@ def simulate(
     )
     if np.ndim(bins) == 0:
         count = min(_whole("bins", bins, 1), MOST_BINS + 1)  # more than enough to be refused
-        reach = (
-            default_reach_mm([layer for layer in layers if isinstance(layer, Layer)])
+        radius = (
+            _reach_mm([layer for layer in layers if isinstance(layer, Layer)])
             if r_max_mm is None
             else r_max_mm
         )
-        if _number("r_max_mm", reach, 0, "a radius in mm, more than 0") == 0:
+        if _number("r_max_mm", radius, 0, "a radius in mm, more than 0") == 0:
             raise InputError("r_max_mm is 0; expected a radius in mm, more than 0")
-        bins = reach * (np.arange(count + 1) / count) ** 2
+        bins = radius * (np.arange(count + 1) / count) ** 2
     elif r_max_mm is not None:
         raise InputError("r_max_mm and the edges of the bins are both given; expected one of them")
     setting = Setting(

@@ -8,7 +8,7 @@ from scipy import sparse
 from renderer.scene import Model, Proxy, Surface
 from renderer.scene.material import Skin
 from stimuli.heads import eyes, hair, skin
-from stimuli.heads.mpfb import Anatomy, Bust
+from stimuli.heads.anatomy import Anatomy, Bust
 from stimuli.heads.person import Person
 from stimuli.heads.subdivide import triangles
 

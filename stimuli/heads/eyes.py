@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from renderer.scene import Eye
-from stimuli.heads.mpfb import Eyeball
+from stimuli.heads.anatomy import Eyeball
 from stimuli.heads.person import Eyes
 from stimuli.heads.subdivide import vertex_normals
 

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from renderer.scene import MASKS, Strands
-from stimuli.heads.mpfb import Anatomy
+from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.person import Hair
 from stimuli.heads.skin import azimuth, smoothstep
 

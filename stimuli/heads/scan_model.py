@@ -7,7 +7,7 @@ from scipy import sparse
 
 from renderer.scene import MASKS, Material, Model, Proxy, Surface
 from stimuli.heads import eyes
-from stimuli.heads.mpfb import Eyeball
+from stimuli.heads.anatomy import Eyeball
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
 CLUSTER_MM = 3.0

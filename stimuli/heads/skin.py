@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from renderer.scene import MASKS
-from stimuli.heads.mpfb import Anatomy, Bust
+from stimuli.heads.anatomy import Anatomy, Bust
 
 HEAD_AXIS_Z = 45.0  # mm: the vertical axis of the skull that azimuths are measured about
 

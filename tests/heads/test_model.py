@@ -6,7 +6,8 @@ import pytest
 import renderer
 from renderer.scene import MASKS, Environment
 from renderer.scene.graph import SceneGraph
-from stimuli.heads import fetch, mpfb, subdivide
+from stimuli.heads import anatomy as anatomies
+from stimuli.heads import fetch, subdivide
 from stimuli.heads.default_head import default_model
 from stimuli.heads.person import Person
 from stimuli.heads.scan_model import scan_model
@@ -17,7 +18,7 @@ MAN = Person.read(read_toml(PEOPLE / "man.toml"), "man")
 
 @pytest.fixture(scope="module")
 def anatomy():
-    return mpfb.build_anatomy(fetch.mpfb_data(), MAN)
+    return anatomies.build_anatomy(fetch.mpfb_data(), MAN)
 
 
 @pytest.fixture(scope="module")

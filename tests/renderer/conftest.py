@@ -7,7 +7,8 @@ import renderer as package
 from renderer import gl
 from renderer.scene.graph import SceneGraph
 from stimuli import scenes
-from stimuli.heads import fetch, mpfb
+from stimuli.heads import anatomy as anatomies
+from stimuli.heads import fetch
 from stimuli.heads.default_head import default_model
 from stimuli.heads.person import Person
 from stimuli.parts import PEOPLE, read_toml
@@ -43,7 +44,7 @@ def stand():
 
 @pytest.fixture(scope="session")
 def anatomy():
-    return mpfb.build_anatomy(fetch.mpfb_data(), MAN)
+    return anatomies.build_anatomy(fetch.mpfb_data(), MAN)
 
 
 @pytest.fixture(scope="session")
