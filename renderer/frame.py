@@ -196,8 +196,8 @@ class Renderer:
 class Frame:
     """The shared buffers of one view; use it as a context manager, or close() it.
 
-    surface.textures: irradiance (alpha: the medium's id), specular, albedo, depth and normal,
-    transmitted light; all at the size of the image times the supersampling.
+    surface.textures: irradiance (alpha: the medium's id), specular, albedo (alpha: what gets out
+    through the face), view depth, transmitted light; all at the image's size times supersample.
     """
 
     def __init__(self, renderer: Renderer, view: View, picture: Picture):
@@ -287,7 +287,7 @@ class Frame:
         self,
         translucent: bool,
         irradiance: gl.Texture | None = None,
-        depth_normal: gl.Texture | None = None,
+        depths: gl.Texture | None = None,
         medium: int = 1,
         texturing: float = 0.0,
         diffuse: str = "lambert",
@@ -298,7 +298,7 @@ class Frame:
             r.context,
             r.program,
             irradiance or self.irradiance(translucent, medium, texturing, diffuse),
-            depth_normal or self.surface.textures[3],
+            depths or self.surface.textures[3],
             self.width,
             self.height,
             self.view.pixels_per_mm,

@@ -2,7 +2,7 @@
 #include "shaders/common.glsl"
 #include "shaders/environment.glsl"
 in vec2 uv;
-uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albedo; uniform sampler2D depth_normal; uniform sampler2D hair;
+uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albedo; uniform sampler2D depths; uniform sampler2D hair;
 uniform float exposure;
 uniform float conserving;  // 1: what the face sends back inside does not get out
 uniform float texturing;  // the power of the albedo that is in the scattered light already
@@ -29,7 +29,7 @@ vec3 behind() {
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
-    float depth = texelFetch(depth_normal, at, 0).x;
+    float depth = texelFetch(depths, at, 0).x;
     vec3 radiance = behind();
     if (depth > 0.0) {
         vec4 face = texelFetch(albedo, at, 0);

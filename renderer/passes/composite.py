@@ -32,14 +32,14 @@ def composite(
     conserving: the face holds back what it reflects inside.
     """
     width, height = surface.width, surface.height
-    _, specular, albedo, depth_normal, _ = surface.textures
+    _, specular, albedo, depths, _ = surface.textures
     programs_uniforms = {
         "scattered": scattered,
         "specular": specular,
         "albedo": albedo,
         "texturing": texturing,
         "conserving": float(conserving),
-        "depth_normal": depth_normal,
+        "depths": depths,
         "hair": hair.textures[0],
         "exposure": picture.exposure,
         "tone_map": TONE_MAPS.index(picture.tone_map),

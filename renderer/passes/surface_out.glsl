@@ -3,7 +3,7 @@
 layout(location = 0) out vec4 out_irradiance;    // rgb: E, alpha: the id of the material that scatters, 0 for none
 layout(location = 1) out vec4 out_specular;      // rgb: radiance added after scattering
 layout(location = 2) out vec4 out_albedo;        // rgb: diffuse albedo, alpha: the share of it that gets out, not sent back
-layout(location = 3) out vec4 out_depth_normal;  // screen: view depth in mm, normal in view space; else: normal in the world
+layout(location = 3) out vec4 out_depth;  // screen: view depth in mm; else: normal in the world
 layout(location = 4) out vec4 out_transmitted;   // rgb: irradiance that comes through from behind
 #if DOMAIN != SCREEN
 layout(location = 5) out vec4 out_position;      // xyz: mm in the world, alpha 1
@@ -11,7 +11,6 @@ layout(location = 5) out vec4 out_position;      // xyz: mm in the world, alpha 
 in vec3 world; in vec3 local; in vec3 world_normal; in vec2 uv; in vec4 a; in vec4 b; in mat3 light; in float open_sky; in float scatters;
 in float view_depth;
 uniform mat4 model;
-uniform mat4 view;
 
 // Millimetres that a fragment covers: relief finer than that fades out.
 #if DOMAIN == POINTS
@@ -26,9 +25,9 @@ float footprint_mm() {
 
 void put_place(vec3 n) {
 #if DOMAIN == SCREEN
-    out_depth_normal = vec4(view_depth, mat3(view) * n);
+    out_depth = vec4(view_depth);
 #else
-    out_depth_normal = vec4(n, 1.0);
+    out_depth = vec4(n, 1.0);
     out_position = vec4(world, 1.0);
 #endif
 }

@@ -22,10 +22,11 @@ from renderer.scene.graph import Contents, Item
 from renderer.scene.material import Material, Skin
 from renderer.scene.model import MASKS
 
-#: Irradiance and the material's id; specular; albedo; depth and normal; what comes through.
-FORMATS = (GL.GL_RGBA32F, GL.GL_RGBA16F, GL.GL_RGBA16F, GL.GL_RGBA32F, GL.GL_RGBA16F)
-#: The same over an atlas or points, with the place in the world.
-PLACED_FORMATS = (*FORMATS, GL.GL_RGBA32F)
+_HALF = GL.GL_RGBA16F
+#: Irradiance and the material's id; specular; albedo; view depth; what comes through.
+FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, GL.GL_R32F, _HALF)
+#: Over an atlas or points: the normal in the depth's stead, and the place in the world.
+PLACED_FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, _HALF, _HALF, GL.GL_RGBA32F)
 MAPS = ("albedo_map", "normal_map", "roughness_map")
 
 Program = Callable[..., gl.Program]

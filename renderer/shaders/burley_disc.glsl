@@ -1,6 +1,6 @@
 // One sample of Burley's disc in screen space (Golubev 2018), shared by golubev and golubev_plus.
 #include "shaders/common.glsl"
-uniform sampler2D irradiance; uniform sampler2D depth_normal;
+uniform sampler2D irradiance; uniform sampler2D depths;
 uniform vec4 samples[SAMPLES];    // x, y, radius in mm; 1 / density
 uniform vec3 shape;               // s = 1 / d per channel, 1/mm
 uniform float pixels_per_mm;      // at 1 mm
@@ -18,7 +18,7 @@ bool begin(out Pixel p) {
     scattered = vec4(centre.rgb, skin ? 1.0 : 0.0);
     count = vec4(skin ? 1.0 : 0.0, 0.0, 0.0, 1.0);
     p.irradiance = centre.rgb;
-    p.depth = texelFetch(depth_normal, ivec2(gl_FragCoord.xy), 0).x;
+    p.depth = texelFetch(depths, ivec2(gl_FragCoord.xy), 0).x;
     p.at = gl_FragCoord.xy;
     p.size = vec2(textureSize(irradiance, 0));
     p.scale = pixels_per_mm / max(p.depth, 1e-3);
@@ -33,7 +33,7 @@ vec4 take(int k, Pixel p, inout Sum sum) {
     vec2 there = (p.at + p.turn * s.xy * p.scale) / p.size;
     vec4 e = texture(irradiance, there);
     if (e.a < 0.5) return vec4(0.0);
-    float dz = texture(depth_normal, there).x - p.depth;
+    float dz = texture(depths, there).x - p.depth;
     float r = sqrt(s.z * s.z + dz * dz);
     vec3 third = exp(-shape * r / 3.0);
     vec3 w = shape * (third * third * third + third) * s.w;  // R(r') r' over R(r) r

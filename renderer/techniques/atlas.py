@@ -87,12 +87,10 @@ class Atlas:
         self._owned.append(made)
         return made
 
-    def draw(
-        self, into: gl.Target, shader: str, defines: dict[str, Any] | None = None, **uniforms
-    ) -> None:
+    def draw(self, into: gl.Target, shader: str, blend: str | None = None, **uniforms) -> None:
         """One pass over the atlas; those of light, place and texel_mm that a shader has are set."""
-        into.bind()
-        program = self.inputs.programs(shader, defines or {})
+        into.bind(blend=blend)
+        program = self.inputs.programs(shader)
         shared = {
             name: getattr(self, name)
             for name in ("light", "place", "texel_mm")

@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 class Inputs:
     """The shared buffers, all (height, width) at the resolution at which scattering is computed.
 
-    irradiance: RGBA32F, rgb = E, alpha = 1 where the medium at hand scatters. depth_normal:
-    RGBA32F, x = view depth in mm (0 where nothing is), yzw = view-space normal. pixels_per_mm:
-    pixels of this resolution per mm at 1 mm distance. supersample: pixels of this resolution per
-    output pixel, along one side. curve: the medium's reference curve. room: the surfaces of the
-    medium themselves, for techniques that work over another domain than the screen.
+    irradiance: RGBA32F, rgb = E, alpha = 1 where the medium at hand scatters. depths: R32F, view
+    depth in mm (0 where nothing is). pixels_per_mm: pixels of this resolution per mm at 1 mm
+    distance. supersample: pixels of this resolution per output pixel, along one side. curve: the
+    medium's reference curve. room: the surfaces of the medium themselves, for techniques that work
+    over another domain than the screen.
     """
 
     context: object
     programs: object
     irradiance: object
-    depth_normal: object
+    depths: object
     width: int
     height: int
     pixels_per_mm: float

@@ -16,6 +16,9 @@ TAPS = np.array([0.006, 0.061, 0.242, 0.382, 0.242, 0.061, 0.006])
 #: Of the taps, in sigma^2: 1.079, divided out of each step.
 TAPS_VARIANCE = float((TAPS * np.arange(-3, 4) ** 2).sum() / TAPS.sum())
 
+#: Shaders of the weighted sum: what it starts from, and one more blur.
+START, ADD = "techniques/weighted_start.glsl", "techniques/weighted_add.glsl"
+
 
 def steps(fit: GaussianFit) -> list[tuple[float, np.ndarray]]:
     """(sigma in mm of the blur that leads there, weight (C,)) of each Gaussian, narrowest first."""

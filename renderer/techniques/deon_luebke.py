@@ -13,12 +13,11 @@ from typing import ClassVar
 import numpy as np
 
 from renderer import gl
-from renderer.gl import GL
 from renderer.optics import fits
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
 from renderer.techniques.atlas import Atlas, AtlasTechnique
-from renderer.techniques.cascade import TAPS, TAPS_VARIANCE, steps
+from renderer.techniques.cascade import ADD, START, TAPS, TAPS_VARIANCE, steps
 
 
 @dataclass(frozen=True)
@@ -74,18 +73,14 @@ class DeonLuebke(AtlasTechnique):
         blurs, unblurred = steps(fit), np.zeros(3)
         if self.first == "published":
             blurs, unblurred = blurs[1:], fit.weights[0]
-        both = (GL.GL_RGBA32F, GL.GL_RGBA32F)
-        ping, pong, row = atlas.target(*both), atlas.target(*both), atlas.target(*both)
+        row, blurred, total = atlas.target(), atlas.target(), atlas.target()
         common = {**self.stride(), "taps": TAPS / TAPS.sum(), "reach": len(TAPS) // 2}
-        source = total = atlas.light
-        shader, nothing = "techniques/deon_luebke.glsl", np.zeros(3)
-        for k, (sigma, weight) in enumerate(blurs):
-            own = {**common, "sigma": sigma, "sum_so_far": total}
-            across = {"axis": (1.0, 0.0), "weight": nothing, "sum_scale": nothing}
-            atlas.draw(row, shader, source=source, **across, **own)
-            scale = unblurred if k == 0 else np.ones(3)
-            down = {"axis": (0.0, 1.0), "weight": weight, "sum_scale": scale}
-            atlas.draw(ping, shader, source=row.textures[0], **down, **own)
-            source, total = ping.textures
-            ping, pong = pong, ping
-        return total
+        atlas.draw(total, START, light=atlas.light, unblurred=unblurred, samples=0.0)
+        source, shader = atlas.light, "techniques/deon_luebke.glsl"
+        for sigma, weight in blurs:
+            own = {**common, "sigma": sigma}
+            atlas.draw(row, shader, source=source, axis=(1.0, 0.0), **own)
+            atlas.draw(blurred, shader, source=row.textures[0], axis=(0.0, 1.0), **own)
+            source = blurred.textures[0]
+            atlas.draw(total, ADD, blend="add", source=source, weight=weight)
+        return total.textures[0]

@@ -14,11 +14,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from renderer.gl import GL
 from renderer.optics import fits
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
-from renderer.techniques.cascade import TAPS, TAPS_VARIANCE, steps
+from renderer.techniques.cascade import ADD, START, TAPS, TAPS_VARIANCE, steps
 from renderer.techniques.screen import Canvas, ScreenTechnique
 
 
@@ -96,39 +95,18 @@ class JimenezGaussian(ScreenTechnique):
             "gradient_limit": self.gradient_limit,
             "supersample": float(inputs.supersample),
         }
-        both = (GL.GL_RGBA32F, GL.GL_RGBA32F)
-        ping, pong = canvas.target(*both), canvas.target(*both)
-        row = canvas.target()
-        source = total = inputs.irradiance
-        blurs, nothing = self.blurs(fit), (0.0, 0.0, 0.0)
-        unblurred = np.zeros(3) if self.first == "blurred" else fit.weights[0]
-        for k, (sigma, weight) in enumerate(blurs):
-            last = k == len(blurs) - 1
-            own = {"sigma": sigma, "sum_so_far": total}
-            horizontal = {"axis": (1.0, 0.0), "weight": nothing, "sum_scale": nothing}
-            canvas.draw(
-                row,
-                self.file(),
-                {},
-                source=source,
-                samples=0.0,
-                final=0,
-                **horizontal,
-                **own,
-                **common,
-            )
-            canvas.draw(
-                canvas.result if last else ping,
-                self.file(),
-                {},
-                source=row.textures[0],
-                axis=(0.0, 1.0),
-                weight=weight,
-                sum_scale=unblurred if k == 0 else np.ones(3),
-                samples=float(2 * len(TAPS) * len(blurs)),
-                final=int(last),
-                **own,
-                **common,
-            )
-            source, total = ping.textures[0], ping.textures[1]
-            ping, pong = pong, ping
+        row, blurred = canvas.target(), canvas.target()
+        blurs = self.blurs(fit)
+        start = {
+            "light": inputs.irradiance,
+            "unblurred": np.zeros(3) if self.first == "blurred" else fit.weights[0],
+            "samples": float(2 * len(TAPS) * len(blurs)),
+        }
+        canvas.draw(canvas.result, START, {}, **start)
+        source = inputs.irradiance
+        for sigma, weight in blurs:
+            own = {**common, "sigma": sigma}
+            canvas.draw(row, self.file(), {}, source=source, axis=(1.0, 0.0), **own)
+            canvas.draw(blurred, self.file(), {}, source=row.textures[0], axis=(0.0, 1.0), **own)
+            source = blurred.textures[0]
+            canvas.draw(canvas.result, ADD, {}, blend="add", source=source, weight=weight)

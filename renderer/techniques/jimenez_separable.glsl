@@ -1,6 +1,6 @@
 // One of the two passes of the separable kernel.
 #include "shaders/common.glsl"
-uniform sampler2D source; uniform sampler2D irradiance; uniform sampler2D depth_normal;
+uniform sampler2D source; uniform sampler2D irradiance; uniform sampler2D depths;
 uniform vec4 kernel[TAPS];       // rgb weight, offset in mm
 uniform int taps;                // no constant: an unrolled loop would run for pixels without skin too
 uniform vec2 axis;
@@ -16,7 +16,7 @@ void main() {
     vec4 centre = texelFetch(source, at, 0);
     scattered = centre;
     count = vec4(0.0, 0.0, 0.0, 1.0);
-    float depth = texelFetch(depth_normal, at, 0).x;
+    float depth = texelFetch(depths, at, 0).x;
     vec2 slope = plane == 1 ? vec2(dFdx(depth), dFdy(depth)) : vec2(0.0);  // mm of depth a pixel
     if (texelFetch(irradiance, at, 0).a < 0.5) return;
     vec2 size = vec2(textureSize(source, 0)), uv = gl_FragCoord.xy / size;
@@ -31,7 +31,7 @@ void main() {
         vec2 apart = direction * offset * scale * inversesqrt(1.0 + tangent * tangent);
         vec2 there = uv + apart / size;
         vec3 tap = texture(source, there).rgb;
-        float away = abs(texture(depth_normal, there).x - depth - dot(slope, apart)) / follow_surface_mm;
+        float away = abs(texture(depths, there).x - depth - dot(slope, apart)) / follow_surface_mm;
         if (texture(irradiance, there).a < 0.5) away = 1.0;
         sum += kernel[k].rgb * mix(tap, centre.rgb, clamp(away, 0.0, 1.0));
     }

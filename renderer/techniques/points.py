@@ -159,7 +159,7 @@ class PointsTechnique(Technique):
                 program.use(
                     light=light.textures[0],
                     places=places,
-                    depth_normal=inputs.depth_normal,
+                    depths=inputs.depths,
                     irradiance=inputs.irradiance,
                     profile=profile,
                     view=room.camera["view"],

@@ -38,13 +38,20 @@ class Canvas:
         self._scratch.append(made)
         return made
 
-    def draw(self, into: gl.Target, shader: str, defines: dict[str, Any], **uniforms) -> None:
+    def draw(
+        self,
+        into: gl.Target,
+        shader: str,
+        defines: dict[str, Any],
+        blend: str | None = None,
+        **uniforms,
+    ) -> None:
         """One pass over the whole of a target; irradiance and depth are always given."""
-        into.bind()
+        into.bind(blend=blend)
         program = self.inputs.programs(shader, defines)
         shared = {
             "irradiance": self.inputs.irradiance,
-            "depth_normal": self.inputs.depth_normal,
+            "depths": self.inputs.depths,
             "pixels_per_mm": self.inputs.pixels_per_mm,
         }
         program.use(**program.accepts(shared), **uniforms)
@@ -77,7 +84,7 @@ class ScreenTechnique(Technique):
         return {}
 
     def uniforms(self, inputs: Inputs) -> dict[str, Any]:
-        """What the shader takes beside irradiance, depth_normal and pixels_per_mm."""
+        """What the shader takes beside irradiance, depths and pixels_per_mm."""
         return {}
 
     def passes(self, canvas: Canvas) -> None:

@@ -1,5 +1,5 @@
 // A point on the surface with its light; one that nothing visible lies near is left out.
-uniform sampler2D light; uniform sampler2D places; uniform sampler2D depth_normal;
+uniform sampler2D light; uniform sampler2D places; uniform sampler2D depths;
 uniform mat4 view; uniform mat4 projection;
 uniform float reach_mm;
 out vec3 point_light; out vec3 point_at;  // irradiance; place in view space, mm
@@ -20,7 +20,7 @@ void main() {
         for (int k = 0; k < 9; ++k) {
             vec2 at = gl_Position.xy / gl_Position.w + extent * vec2(k % 3 - 1, k / 3 - 1);
             if (any(greaterThan(abs(at), vec2(1.0)))) { near = true; continue; }
-            float seen = texture(depth_normal, at * 0.5 + 0.5).x;
+            float seen = texture(depths, at * 0.5 + 0.5).x;
             if (seen > 0.0 && depth < seen + reach_mm) near = true;
         }
         if (!near) point_kept = 0.0;
