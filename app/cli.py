@@ -18,6 +18,7 @@ VERBS = {
     "redraw": "app.commands.redraw",
     "judge": "app.commands.judge",
     "montecarlo": "app.commands.montecarlo",
+    "harmonics": "app.commands.harmonics",
     "cache": "app.commands.cache",
 }
 

@@ -197,7 +197,7 @@ def test_a_map_is_turned_towards_the_persons_left(tmp_path):
 
 def test_convolved_maps_keep_their_light():
     """Each layer holds the power of the map."""
-    from renderer.passes import environment as maps
+    from renderer.scene import maps
 
     panel = Environment(panels={"p": Panel((0.3, 0.5, 0.8), 40.0, (1.0, 2.0, 3.0))})
     towards = maps.directions(64)
