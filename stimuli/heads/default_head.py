@@ -27,12 +27,12 @@ def default_model(
 ) -> Model:
     """The bust with skin, eyes and hair."""
     person = person or Person()
-    hairline = person.hair.hairline_mm
+    lines = {"hairline_mm": person.hair.hairline_mm, "regions": person.regions}
     own = Skin.read(person.skin, "person.skin")
     fine, coarse = anatomy.levels[-1], anatomy.levels[1]
-    mask = skin.masks(anatomy, fine, hairline)
+    mask = skin.masks(anatomy, fine, **lines)
     where, uv, faces = _split(fine)
-    coarse_mask = skin.masks(anatomy, coarse, hairline)
+    coarse_mask = skin.masks(anatomy, coarse, **lines)
     proxy_faces = triangles(coarse.quads)
     pick = sparse.csr_matrix(
         (np.ones(len(where)), (np.arange(len(where)), where)), (len(where), len(fine.positions))

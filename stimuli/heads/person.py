@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from renderer.errors import InputError
 from renderer.parameters import Parameters, parameter, refuse_unknown
+from stimuli.heads.regions import Regions
 
 _COLOUR = {"unit": "linear albedo", "low": 0.0, "high": 1.0}
 
@@ -69,6 +70,7 @@ class Person(Parameters):
     arm_drop_deg: float = parameter(32.0, unit="degrees", low=0.0, high=80.0, source="by eye")
     eyes: Eyes = field(default_factory=Eyes)
     hair: Hair = field(default_factory=Hair)
+    regions: Regions = field(default_factory=Regions)
     skin: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -87,5 +89,6 @@ class Person(Parameters):
             arm.arm_drop_deg,
             Eyes.read(table.get("eyes", {}), f"{where}.eyes"),
             Hair.read(table.get("hair", {}), f"{where}.hair"),
+            Regions.read(table.get("regions", {}), f"{where}.regions"),
             dict(table.get("skin", {})),
         )

@@ -1,0 +1,137 @@
+"""Where the skin is what: lines of hair and beard, and how much of each feature lies where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, ClassVar
+
+from renderer.errors import InputError
+from renderer.parameters import Parameters, parameter, refuse_unknown
+
+PLACES = (
+    "everywhere",
+    "cheeks",
+    "nose",
+    "wings",
+    "ears",
+    "chin",
+    "forehead",
+    "chest",
+    "neck",
+    "eyelids",
+)
+_LINES = ("hairline", "beard_top", "beard_bottom")
+_WEIGHTS = {
+    "flush": {
+        "cheeks": 0.55,
+        "nose": 0.75,
+        "wings": 0.5,
+        "ears": 0.62,
+        "chin": 0.28,
+        "forehead": 0.16,
+        "chest": 0.16,
+        "neck": 0.10,
+        "eyelids": 0.20,
+    },
+    "pores": {
+        "everywhere": 0.30,
+        "nose": 0.62,
+        "wings": 0.60,
+        "cheeks": 0.42,
+        "forehead": 0.30,
+        "chin": 0.30,
+        "neck": -0.15,
+    },
+    "oil": {
+        "everywhere": 0.25,
+        "nose": 0.55,
+        "wings": 0.45,
+        "forehead": 0.45,
+        "cheeks": 0.20,
+        "chin": 0.20,
+        "neck": -0.2,
+    },
+    "smooth": {"eyelids": 0.85, "ears": 0.6},
+}
+
+# fmt: off
+_HAIRLINE = (
+    (0, 61), (14, 62), (26, 66), (36, 62), (46, 46), (56, 34), (63, 8), (67, -24), (71, -44),
+    (76, -46), (81, -30), (88, -6), (97, 2), (108, -20), (118, -45), (140, -62), (180, -70),
+)
+_BEARD_TOP = (
+    (0, -44), (14, -46), (24, -60), (38, -66), (52, -52), (62, -34), (70, -24), (78, -36),
+    (90, -62), (110, -80), (180, -90),
+)
+_BEARD_BOTTOM = ((0, -150), (30, -152), (60, -140), (80, -115), (95, -92), (180, -90))
+# fmt: on
+
+
+def _radius(default: float) -> float:
+    return parameter(default, unit="mm", low=1.0, high=100.0, source="of a soft spot, by eye")
+
+
+@dataclass(frozen=True)
+class Regions(Parameters):
+    """Where the features of a generated person's skin lie; all defaults were chosen by eye.
+
+    hairline, beard_top, beard_bottom: points (azimuth from the face's middle in degrees, 0 to 180
+    and rising; height above the eyes in mm) of lines that both sides share. flush, pores, oil: how
+    much of it lies at each of PLACES, summed; smooth: the share of pores that is missing there. A
+    table goes over the defaults place by place.
+    """
+
+    called: ClassVar[str] = "regions"
+
+    hairline: tuple[tuple[float, float], ...] = _HAIRLINE
+    beard_top: tuple[tuple[float, float], ...] = _BEARD_TOP
+    beard_bottom: tuple[tuple[float, float], ...] = _BEARD_BOTTOM
+    nose_mm: float = _radius(11.0)
+    wings_mm: float = _radius(8.0)
+    cheek_mm: float = _radius(17.0)
+    chin_mm: float = _radius(15.0)
+    cheek_place_mm: tuple[float, float] = parameter(
+        (42.0, 33.0), unit="mm outwards and below the eyes", low=0.0, high=100.0, source="by eye"
+    )
+    flush: dict[str, float] = field(default_factory=dict)
+    pores: dict[str, float] = field(default_factory=dict)
+    oil: dict[str, float] = field(default_factory=dict)
+    smooth: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in _LINES:
+            object.__setattr__(self, name, _line(self.where(name), getattr(self, name)))
+        for name, default in _WEIGHTS.items():
+            own = _weights(self.where(name), getattr(self, name))
+            object.__setattr__(self, name, {**default, **own})
+
+
+def _line(where: str, points: Any) -> tuple[tuple[float, float], ...]:
+    """Points (degrees, mm), checked."""
+    try:
+        line = tuple((float(degrees), float(mm)) for degrees, mm in points)
+    except (TypeError, ValueError):
+        raise InputError(f"{where} is {points!r:.60}; expected pairs of degrees and mm") from None
+    degrees = [point[0] for point in line]
+    rising = all(a < b for a, b in pairwise(degrees))
+    if len(line) < 2 or not rising or not 0 <= degrees[0] <= degrees[-1] <= 180:
+        raise InputError(f"{where} has degrees {degrees}; expected two or more, 0 to 180, rising")
+    if not all(math.isfinite(mm) and abs(mm) <= 500 for _, mm in line):
+        raise InputError(f"{where} is {points!r:.60}; expected heights of -500 to 500 mm")
+    return line
+
+
+def _weights(where: str, table: Any) -> dict[str, float]:
+    """Weights of places, checked."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} is {table!r:.60}; expected a table of places")
+    refuse_unknown(table, PLACES, where)
+    for place, weight in table.items():
+        number = isinstance(weight, int | float) and not isinstance(weight, bool)
+        if not number or not -2 <= weight <= 2:
+            raise InputError(f"{where}.{place} is {weight!r:.60}; expected -2 to 2")
+    return {place: float(weight) for place, weight in table.items()}
