@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from renderer.errors import InputError
 from renderer.techniques.base import Technique
+from renderer.techniques.borshukov_lewis import BorshukovLewis
 from renderer.techniques.deon_luebke import DeonLuebke
 from renderer.techniques.golubev import Golubev
 from renderer.techniques.golubev_plus import GolubevPlus
@@ -21,6 +22,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "jimenez_separable": JimenezSeparable,
     "golubev": Golubev,
     "golubev_plus": GolubevPlus,
+    "borshukov_lewis": BorshukovLewis,
     "deon_luebke": DeonLuebke,
     "splat_dipole": SplatDipole,
 }

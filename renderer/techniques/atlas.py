@@ -12,14 +12,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from renderer import gl
 from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.parameters import parameter
 from renderer.passes.surfaces import Drawn
 from renderer.techniques.base import Inputs, Scattered, Technique
+from renderer.techniques.cascade import ADD, START, TAPS
 from renderer.techniques.screen import output_formats
 
+#: Of a blur along an axis; techniques/atlas_gaussian.glsl has room for as many.
+MOST_TAPS = 49
 #: Atlases whose charts overlap by more than this share of their texels are refused.
 MOST_OVERLAP = 0.01
 
@@ -60,6 +65,13 @@ class Atlas:
             self.draw(places, "techniques/atlas_places.glsl", light=light.textures[0], at=position)
         self.light = light.textures[0]
         self.place, self.texel_mm = places.textures
+
+    def mean_texel_mm(self) -> float:
+        """The side of a square texel that would cover the surface as often."""
+        part, pose = self.drawn.item.primitive, self.drawn.item.pose
+        world = _areas(part.positions @ pose[:3, :3].T, part.faces)
+        flat = _areas(np.pad(part.texcoord_0, ((0, 0), (0, 1))), part.faces)
+        return float(np.sqrt(world / flat) / self.size)
 
     def _refuse_overlap(self) -> None:
         """InputError where charts lie over each other: their light would be one another's."""
@@ -108,11 +120,19 @@ class Atlas:
                 target.delete()
 
 
+def _areas(points: np.ndarray, faces: np.ndarray) -> float:
+    """The area of all triangles."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
 @dataclass(frozen=True)
 class AtlasTechnique(Technique):
     """A filter of the atlas. Override `filter` and `taps`.
 
-    size: texels along a side of the atlas. padding: texels by which charts are carried on beyond
+    size: texels along a side of the atlas. stretch "corrected": a kernel keeps its millimetres
+    however the texture stretches over the surface; "none": every texel counts as the mean one.
+    padding: texels by which charts are carried on beyond
     their borders, so that looking up between texels meets no foreign ones. seams: "stop" leaves a
     tap out that falls off its chart or lands on another (the middle stands for it); "published"
     takes whatever lies there.
@@ -122,6 +142,9 @@ class AtlasTechnique(Technique):
 
     size: int = parameter(
         2048, unit="texels a side", low=64, high=8192, source="1024 in GPU Gems 3, ch. 14"
+    )
+    stretch: str = parameter(
+        "corrected", choices=("corrected", "none"), source="GPU Gems 3, sec. 14.4.3"
     )
     padding: int = parameter(2, unit="texels", low=0, high=16, source="GPU Gems 3, sec. 14.4.2")
     seams: str = parameter("stop", choices=("stop", "published"), source="GPU Gems 3, sec. 14.4.2")
@@ -175,6 +198,38 @@ class AtlasTechnique(Technique):
             program.use(**program.accepts(values))
             drawn.mesh.draw()
 
-    def stride(self) -> dict[str, Any]:
-        """What every blur's shader is told of seams."""
-        return {"stop": int(self.seams == "stop")}
+    def stride(self, atlas: Atlas) -> dict[str, Any]:
+        """What every blur's shader is told of seams and of stretch."""
+        even = atlas.mean_texel_mm() if self.stretch == "none" else 0.0
+        return {"stop": int(self.seams == "stop"), "even_mm": even}
+
+
+def blur_of_blurs(
+    technique: AtlasTechnique,
+    atlas: Atlas,
+    blurs: list[tuple[float, np.ndarray]],
+    unblurred: np.ndarray,
+    taps: np.ndarray = TAPS,
+    spacing: float = 1.0,
+) -> gl.Texture:
+    """A weighted sum of Gaussians, each the one before blurred along u and then v (cascade.steps).
+
+    blurs: (sigma in mm of a step, weight (3,)); unblurred (3,): the light's own weight; taps: of
+    an axis, an odd number up to MOST_TAPS, spacing sigmas apart.
+    """
+    row, blurred, total = atlas.target(), atlas.target(), atlas.target()
+    common = {
+        **technique.stride(atlas),
+        "taps": np.pad(taps / taps.sum(), (0, MOST_TAPS - len(taps))),
+        "spacing": spacing,
+        "reach": len(taps) // 2,
+    }
+    atlas.draw(total, START, light=atlas.light, unblurred=unblurred, samples=0.0)
+    source, shader = atlas.light, "techniques/atlas_gaussian.glsl"
+    for sigma, weight in blurs:
+        own = {**common, "sigma": sigma}
+        atlas.draw(row, shader, source=source, axis=(1.0, 0.0), **own)
+        atlas.draw(blurred, shader, source=row.textures[0], axis=(0.0, 1.0), **own)
+        source = blurred.textures[0]
+        atlas.draw(total, ADD, blend="add", source=source, weight=weight)
+    return total.textures[0]

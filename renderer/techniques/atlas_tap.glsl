@@ -1,5 +1,6 @@
 // A tap of a filter over the atlas: what lies off the chart is not taken where seams stop.
 uniform sampler2D source; uniform sampler2D place; uniform sampler2D texel_mm;
+uniform float even_mm;  // mm that every texel is taken to reach; 0: as far as it does
 uniform int stop;  // 1: a tap that leaves its chart is the middle's own, 0: whatever lies there
 
 struct Texel { vec4 own; vec3 at; vec2 mm; vec2 uv; };
@@ -7,7 +8,7 @@ struct Texel { vec4 own; vec3 at; vec2 mm; vec2 uv; };
 bool begin(out Texel t) {
     ivec2 here = ivec2(gl_FragCoord.xy);
     vec4 p = texelFetch(place, here, 0);
-    t = Texel(texelFetch(source, here, 0), p.xyz, texelFetch(texel_mm, here, 0).xy, gl_FragCoord.xy / vec2(textureSize(place, 0)));
+    t = Texel(texelFetch(source, here, 0), p.xyz, even_mm > 0.0 ? vec2(even_mm) : texelFetch(texel_mm, here, 0).xy, gl_FragCoord.xy / vec2(textureSize(place, 0)));
     return p.a > 0.5;
 }
 

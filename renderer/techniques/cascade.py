@@ -20,8 +20,19 @@ TAPS_VARIANCE = float((TAPS * np.arange(-3, 4) ** 2).sum() / TAPS.sum())
 START, ADD = "techniques/weighted_start.glsl", "techniques/weighted_add.glsl"
 
 
-def steps(fit: GaussianFit) -> list[tuple[float, np.ndarray]]:
-    """(sigma in mm of the blur that leads there, weight (C,)) of each Gaussian, narrowest first."""
+def gaussian_taps(count: int) -> tuple[np.ndarray, float, float]:
+    """(weights (count,) of sum 1, spacing in sigma, variance in sigma^2) of taps over 3 sigma."""
+    at = np.linspace(-3, 3, count)
+    weights = np.exp(-(at**2) / 2)
+    weights /= weights.sum()
+    return weights, 6 / (count - 1), float((weights * at**2).sum())
+
+
+def steps(fit: GaussianFit, variance: float = TAPS_VARIANCE) -> list[tuple[float, np.ndarray]]:
+    """(sigma in mm of the blur that leads there, weight (C,)) of each Gaussian, narrowest first.
+
+    variance: of the taps that blur, in sigma^2.
+    """
     before = np.concatenate([[0.0], fit.variance_mm2[:-1]])
-    sigma = np.sqrt((fit.variance_mm2 - before) / TAPS_VARIANCE)
+    sigma = np.sqrt((fit.variance_mm2 - before) / variance)
     return list(zip(sigma.tolist(), fit.weights, strict=True))

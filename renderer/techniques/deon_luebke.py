@@ -16,8 +16,8 @@ from renderer import gl
 from renderer.optics import fits
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
-from renderer.techniques.atlas import Atlas, AtlasTechnique
-from renderer.techniques.cascade import ADD, START, TAPS, TAPS_VARIANCE, steps
+from renderer.techniques.atlas import Atlas, AtlasTechnique, blur_of_blurs
+from renderer.techniques.cascade import TAPS, TAPS_VARIANCE, steps
 
 
 @dataclass(frozen=True)
@@ -73,14 +73,4 @@ class DeonLuebke(AtlasTechnique):
         blurs, unblurred = steps(fit), np.zeros(3)
         if self.first == "published":
             blurs, unblurred = blurs[1:], fit.weights[0]
-        row, blurred, total = atlas.target(), atlas.target(), atlas.target()
-        common = {**self.stride(), "taps": TAPS / TAPS.sum(), "reach": len(TAPS) // 2}
-        atlas.draw(total, START, light=atlas.light, unblurred=unblurred, samples=0.0)
-        source, shader = atlas.light, "techniques/deon_luebke.glsl"
-        for sigma, weight in blurs:
-            own = {**common, "sigma": sigma}
-            atlas.draw(row, shader, source=source, axis=(1.0, 0.0), **own)
-            atlas.draw(blurred, shader, source=row.textures[0], axis=(0.0, 1.0), **own)
-            source = blurred.textures[0]
-            atlas.draw(total, ADD, blend="add", source=source, weight=weight)
-        return total.textures[0]
+        return blur_of_blurs(self, atlas, blurs, unblurred)
