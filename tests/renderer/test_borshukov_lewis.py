@@ -21,8 +21,8 @@ def test_a_slab_answers_as_two_gaussians():
 
 
 def test_without_stretch_correction_widths_follow_the_texture():
-    """The slab's face takes 0.32 of the atlas's width and 0.48 of its height: along x a texel is 1.5
-    times as far as along y, and red widens by the ratio of that to the mean."""
+    """The slab's face takes 0.32 of the atlas's width and 0.48 of its height: along x a texel is
+    1.5 times as far as along y, and red widens by the ratio of that to the mean."""
     plain = renderer.make("borshukov_lewis", {"size": 1024, "stretch": "none"})
     u, got, _ = surface_edge_response(TECHNIQUE)
     v, loose, _ = surface_edge_response(plain)
