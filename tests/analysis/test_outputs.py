@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -177,6 +178,30 @@ def test_typst_markup_in_a_name_stays_text():
         True,
     )
     assert content.startswith(b"%PDF")
+
+
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no poppler here")
+def test_long_names_stay_in_their_columns(tmp_path):
+    """Words of one line of a table do not lie over each other."""
+    name = "technique_with_a_rather_long_name_{}"
+    rows = tuple((name.format(k), name.format(f"{k}0"), *("0.50 [0.10, 0.90]",) * 4) for k in "123")
+    columns = ("A", "B", "Rank-biserial", "Standardised mean", "Contrast, points", "Holm p")
+    table = Shown("x", "", columns, (False, False, True, True, True, True), rows)
+    (tmp_path / "one.pdf").write_bytes(pdf.make("t", "= x", [], [], [table], [], [], False))
+    found = subprocess.run(
+        ["pdftotext", "-bbox", tmp_path / "one.pdf", "-"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    box = r'xMin="([\d.]+)" yMin="([\d.]+)" xMax="([\d.]+)"'
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for left, top, right in re.findall(box, found):
+        lines.setdefault(top, []).append((float(left), float(right)))
+    assert any(len(words) > 8 for words in lines.values())
+    for words in lines.values():
+        for (_, right), (left, _) in pairwise(sorted(words)):
+            assert left >= right - 5  # pt: the box of a word counts the break behind it
 
 
 def test_methods_name_every_choice_seed_version_and_source(study_report):
