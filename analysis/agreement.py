@@ -381,10 +381,15 @@ def triads(panel: Panel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     n = len(panel.items)
     sign = np.zeros((len(panel.participants), n, n), np.int8)
     given = np.sign(np.where(panel.answered, panel.preference, 0))
-    sign[:, panel.first, panel.second], sign[:, panel.second, panel.first] = (
-        -given,
-        given,
-    )  # 1: the row is preferred
+    # 1: the row is preferred
+    sign[:, panel.first, panel.second] = -given
+    sign[:, panel.second, panel.first] = given
+    return _count_triads(sign)
+
+
+def _count_triads(sign: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`triads` of sign (P, n, n): 1 where the row is preferred, -1 where the column is, else 0."""
+    n = sign.shape[1]
     circular, decided, guessed = (np.zeros(len(sign)) for _ in range(3))
     for i, j, k in combinations(range(n), 3):
         round_trip = np.stack([sign[:, i, j], sign[:, j, k], sign[:, k, i]])
@@ -396,7 +401,12 @@ def triads(panel: Panel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def zeta(circular: np.ndarray, n: int) -> np.ndarray:
     """The coefficient of consistency of n items, from the number of circular triads."""
-    return 1 - np.asarray(circular) / ((n**3 - n) / 24 if n % 2 else (n**3 - 4 * n) / 24)
+    return 1 - np.asarray(circular) / most_triads(n)
+
+
+def most_triads(n: int) -> int:
+    """d_max: the most circular triads that n items can have (Kendall and Babington Smith 1940)."""
+    return (n**3 - n if n % 2 else n**3 - 4 * n) // 24
 
 
 def circular_triads(preferred: np.ndarray) -> int:
@@ -405,10 +415,7 @@ def circular_triads(preferred: np.ndarray) -> int:
     """
     sign = np.sign(np.asarray(preferred, float))
     sign = np.sign(sign - sign.T)
-    return sum(
-        int(abs(sign[i, j] + sign[j, k] + sign[k, i]) == 3)
-        for i, j, k in combinations(range(len(sign)), 3)
-    )
+    return int(_count_triads(sign[None])[0][0])
 
 
 @lru_cache(maxsize=16)
@@ -430,7 +437,7 @@ def triad_distribution(n: int) -> np.ndarray:
                 key = tuple(sorted((*new, sum(won))))
                 grown[key] = grown.get(key, 0.0) + weight
         states = grown
-    chance = np.zeros(round((n**3 - n) / 24 if n % 2 else (n**3 - 4 * n) / 24) + 1)
+    chance = np.zeros(most_triads(n) + 1)
     for scores, weight in states.items():
         chance[comb(n, 3) - sum(comb(score, 2) for score in scores)] += weight
     return chance / chance.sum()

@@ -208,7 +208,7 @@ def responses_from_records(
     raw["line"] = raw["last_line"] = np.arange(1, len(raw) + 1)
     there = [name for name in REQUIRED if name in raw]
     lines = [",".join(values) for values in raw[there].to_numpy()]
-    return _tidy("the records", raw, lines, [], codebook, order, factor, "")
+    return _tidy("the records", raw, lines, [], codebook, order, factor, "", None, further)
 
 
 def _allowed(factor: str) -> None:
@@ -267,8 +267,8 @@ def _tidy(
     order: Iterable[str] | None,
     factor: str,
     sha256: str,
-    dialect: delimited.Rows | None = None,
-    further: tuple[str, ...] = (),
+    dialect: delimited.Rows | None,
+    further: tuple[str, ...],
 ) -> Responses:
     rows = len(raw) + len(findings)
     columns = tuple(column for column in MEASURED if column not in raw)
@@ -283,7 +283,7 @@ def _tidy(
         for at in sorted(reasons)
     ]
     raw["image"] = raw.framing
-    for column in further or (codebook.factors if codebook else ()):
+    for column in further:
         if column in raw:
             raw["image"] = raw.image + "." + raw[column]
     frame = (

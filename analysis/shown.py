@@ -16,6 +16,7 @@ from analysis.codebook import Codebook
 from analysis.inference import alpha_of, verdict
 from analysis.options import Options
 from analysis.responses import Responses
+from analysis.worth import stood_in
 from analysis.worth_figures import DRAWN, MODELS, VERDICTS, framing_label
 
 #: Statistics of agreement.csv that are read, with their names.
@@ -78,8 +79,8 @@ def probability(p: float | None) -> str:
 
 def worths(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
     models = [name for name in MODELS if name in set(table.model)]
-    cells = table.set_index(["framing", "technique", "model"])
-    marked = ~table.fit.isin(["maximum likelihood", ""])
+    marked = stood_in(table.fit)
+    cells = table.assign(marked=marked).set_index(["framing", "technique", "model"])
     rows = []
     for framing in dict.fromkeys(table.framing):
         here = table[table.framing == framing]
@@ -90,7 +91,7 @@ def worths(table: pd.DataFrame, codebook: Codebook, options: Options) -> Shown:
                     values.append(NOTHING)
                     continue
                 one = cells.loc[(framing, technique, model)]
-                star = "*" if one.fit not in ("maximum likelihood", "") else ""
+                star = "*" if one.marked else ""
                 values.append(interval(one.estimate, one.low, one.high) + star)
             rows.append((framing_label(codebook, framing), codebook.label(technique), *values))
     return Shown(

@@ -22,6 +22,7 @@ from analysis.codebook import FRAMING, Codebook
 from analysis.figures import BLUE, GREEN, INK, NARROW_IN, ORANGE, SKY, VERMILLION, WIDTH_IN, Picture
 from analysis.inference import alpha_of, verdict
 from analysis.options import OVERALL, Options
+from analysis.worth import stood_in
 
 #: Model -> its name and the unit of its worths.
 MODELS = {
@@ -63,16 +64,14 @@ def draw_results(
     """The figures of `compute.everything`'s tables, without those that have nothing to show."""
     level, alpha = 100 * options.level, alpha_of(options)
     worths = tables["worths"]
-    few = [
-        draw_triads(tables["participants"], simulated),
-    ]
+    triads = draw_triads(tables["participants"], simulated)
     return [
         *draw_pairs(tables["pairs"], codebook, options.margin, alpha, simulated),
         *draw_ladder(worths, codebook, simulated, options.ties, level),
         *draw_worths(worths, codebook, simulated, level),
         *draw_scores(tables["tallies"], codebook, simulated, level),
         *draw_agreement(tables["agreement"], codebook, simulated, level),
-        *(picture for picture in few if picture is not None),
+        *([] if triads is None else [triads]),
     ]
 
 
@@ -193,8 +192,7 @@ def stand_ins(found: pd.DataFrame, codebook: Codebook) -> str:
     if "fit" not in found:
         return ""
     names = [
-        framing_label(codebook, name)
-        for name in dict.fromkeys(found.framing[~found.fit.isin(["maximum likelihood", ""])])
+        framing_label(codebook, name) for name in dict.fromkeys(found.framing[stood_in(found.fit)])
     ]
     if not names:
         return ""
@@ -216,7 +214,7 @@ def left_out(model: pd.DataFrame, codebook: Codebook) -> str:
 def starred(framing: str, found: pd.DataFrame, codebook: Codebook, width: int) -> str:
     """The framing's label, cut, with an asterisk where a stand-in was fitted."""
     here = found[found.framing == framing]
-    star = "fit" in found and not here.fit.isin(["maximum likelihood", ""]).all()
+    star = "fit" in found and stood_in(here.fit).any()
     return figures._cut(framing_label(codebook, framing), width) + (" *" if star else "")
 
 

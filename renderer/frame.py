@@ -15,6 +15,7 @@ from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.passes.composite import composite
 from renderer.passes.environment import Surroundings
+from renderer.passes.given import draw_given
 from renderer.passes.hair import Hair
 from renderer.passes.lamps import Lamps
 from renderer.passes.surfaces import FORMATS, PLACED_FORMATS, Drawn, Surfaces
@@ -23,7 +24,7 @@ from renderer.scene.camera import Camera
 from renderer.scene.picture import Picture
 from renderer.scene.view import View, main_camera, resolve
 from renderer.techniques.base import Inputs, Room, Technique
-from renderer.techniques.screen import output_formats
+from renderer.techniques.drawing import RESULT_FORMATS
 
 SHADOW_MAP = 4096
 SIZE_LIMIT = 8192  # pixels of a side after supersampling
@@ -270,16 +271,9 @@ class Frame:
         key = (medium, translucent, texturing, diffuse)
         if key not in self._given:
             target = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
-            target.bind()
-            self.renderer.program("passes/add.frag").use(
-                irradiance=below,
-                transmitted=self.surface.textures[4],
-                medium=float(medium),
-                through=float(translucent),
-                albedo=self.surface.textures[2],
-                texturing=texturing,
-            )
-            gl.draw_fullscreen(self.renderer.context)
+            r, (_, _, albedo, _, transmitted) = self.renderer, self.surface.textures
+            light = (below, transmitted, albedo, medium, translucent, texturing)
+            draw_given(r.context, r.program, target, *light)
             self._given[key] = target
         return self._given[key].textures[0]
 
@@ -321,7 +315,7 @@ class Frame:
         first = technique.scatter(self.inputs(**given, medium=1)).target
         if len(media) == 1:
             return first
-        total = gl.Target(self.width, self.height, output_formats())
+        total = gl.Target(self.width, self.height, list(RESULT_FORMATS))
         total.bind(clear=(0.0, 0.0, 0.0, 0.0))
         self.renderer.program("passes/copy.frag").use(source=self.surface.textures[0])
         GL.glDrawBuffers(1, [GL.GL_COLOR_ATTACHMENT0])

@@ -131,6 +131,21 @@ def refuse_unknown(table: Mapping[str, Any], known: Iterable[str], where: str) -
             raise InputError(f"{where}.{key} is unknown; {hint if known else 'expected none'}")
 
 
+def weights(
+    where: str, table: Any, of: str, low: float, high: float, known: Iterable[str] | None = None
+) -> dict[str, float]:
+    """A table of weights of `of`, each low to high; InputError otherwise, or for one not known."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} is {table!r:.60}; expected a table of {of}")
+    if known is not None:
+        refuse_unknown(table, known, where)
+    for name, weight in table.items():
+        number = isinstance(weight, int | float) and not isinstance(weight, bool)
+        if not number or not low <= weight <= high:
+            raise InputError(f"{where}.{name} is {weight!r:.60}; expected {low:g} to {high:g}")
+    return {name: float(weight) for name, weight in table.items()}
+
+
 def _checked(where: str, value: Any, field: dataclasses.Field) -> Any:
     meta, kind = field.metadata, field.metadata["kind"]
     if value is None and meta["optional"]:

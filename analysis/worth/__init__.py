@@ -90,6 +90,11 @@ __all__ = [
 ML, REDUCED, PRIOR_FIT = "maximum likelihood", "reduced bias", "weak prior"
 
 
+def stood_in(fit: pd.Series) -> pd.Series:
+    """Of the tables' column `fit`: where something else stands in for maximum likelihood."""
+    return ~fit.isin([ML, ""])
+
+
 @dataclass(frozen=True)
 class Fit:
     """estimate, low, high (n,), NaN where there is none; method: how the estimate was made, '' if

@@ -368,12 +368,12 @@ def batch_sizes(photons: int) -> np.ndarray:
 def _reach_mm(layers: Sequence[Layer]) -> float:
     """A radius that holds nearly all of what comes back (renderer.optics.medium.reach)."""
     thickness = sum(layer.d for layer in layers)
-    found = [1.0]
+    reaches = []
     for layer in layers:
         if mu_t := layer.mu_a + layer.mu_s * (1 - layer.g):
             diffuse = 1 / math.sqrt(3 * layer.mu_a * mu_t) if layer.mu_a else math.inf
-            found.append(reach(1 / mu_t, diffuse, thickness))
-    return max(found[1:], default=1.0)
+            reaches.append(reach(1 / mu_t, diffuse, thickness))
+    return max(reaches, default=1.0)
 
 
 def cache_folder() -> Path:

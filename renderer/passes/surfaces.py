@@ -91,7 +91,7 @@ class Surfaces:
     def vertices(self) -> np.ndarray:
         """All positions (N, 3) in the world, mm."""
         drawn = [*self.surfaces, *self.eyes]
-        return np.vstack([_world(d.item, d.item.primitive.positions) for d in drawn])
+        return np.vstack([d.item.in_world(d.item.primitive.positions) for d in drawn])
 
     def draw_depth(self, program: gl.Program, shared: dict) -> None:
         """Only where the surfaces are, with a program that takes `model`."""
@@ -206,25 +206,16 @@ class Surfaces:
         return gl.Mesh({where: at(array) for where, array in whole.items()})
 
 
-def _world(item: Item, positions: np.ndarray) -> np.ndarray:
-    return positions @ item.pose[:3, :3].T + item.pose[:3, 3]
-
-
-def _turned(item: Item, normals: np.ndarray) -> np.ndarray:
-    turned = np.asarray(normals, float) @ item.pose[:3, :3].T
-    return turned / np.linalg.norm(item.pose[:3, 0])
-
-
 def _body(item: Item) -> Body:
     part = item.primitive
     if hasattr(part, "proxy"):
         proxy = part.proxy
-        positions, normals = _world(item, proxy.positions), _turned(item, proxy.normals)
+        positions, normals = item.in_world(proxy.positions), item.turned(proxy.normals)
         albedo, value = proxy.albedo, part.material.value
         if isinstance(value, Skin) and proxy.masks is not None:
             albedo = value.mean_albedo(proxy.masks)
         return Body(positions, normals, proxy.faces, np.asarray(albedo), proxy.smooth)
-    positions, normals = _world(item, part.positions), _turned(item, part.normals)
+    positions, normals = item.in_world(part.positions), item.turned(part.normals)
     grey = np.full((len(positions), 3), 0.5)
     return Body(positions, normals, part.faces, grey)
 

@@ -153,6 +153,15 @@ class Item:
     pose: np.ndarray
     mesh: int
 
+    def in_world(self, positions: np.ndarray) -> np.ndarray:
+        """Positions (N, 3) of the object, in the world, mm."""
+        return positions @ self.pose[:3, :3].T + self.pose[:3, 3]
+
+    def turned(self, normals: np.ndarray) -> np.ndarray:
+        """Normals (N, 3) of the object, in the world."""
+        turned = np.asarray(normals, float) @ self.pose[:3, :3].T
+        return turned / np.linalg.norm(self.pose[:3, 0])
+
 
 @dataclass(frozen=True)
 class Contents:

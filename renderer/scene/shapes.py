@@ -29,6 +29,28 @@ class Shape:
     generated: bool = True
 
 
+def triangle_areas(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Areas (M,) of triangles (M, 3) of positions (N, 3), in their unit squared."""
+    a, b, c = (positions[faces[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def points_on(
+    shares: np.ndarray, at: np.ndarray, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (K,) and barycentric weights (K, 3) of points, uniform within a triangle.
+
+    shares (M,): of the triangles, of any sum; at (K,): places in their running sum, 0 to 1. The
+    weights are 1 - sqrt(x), (1 - y) sqrt(x), y sqrt(x) (Turk 1990, "Generating random points in
+    triangles", Graphics Gems).
+    """
+    running = np.cumsum(shares)
+    triangles = np.minimum(np.searchsorted(running, at * running[-1]), len(shares) - 1)
+    x, y = rng.random((2, len(at)))
+    x = np.sqrt(x)
+    return triangles, np.column_stack([1 - x, (1 - y) * x, y * x])
+
+
 def vertex_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Area-weighted unit normals (N, 3) of triangles (M, 3)."""
     p = np.asarray(positions, float)

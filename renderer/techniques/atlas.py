@@ -7,10 +7,8 @@ pads the borders of charts and draws the surfaces; a technique is its parameters
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,70 +16,65 @@ from renderer import gl
 from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.parameters import parameter
+from renderer.passes.given import draw_given
 from renderer.passes.surfaces import Drawn
-from renderer.techniques.base import Inputs, Scattered, Technique
-from renderer.techniques.cascade import ADD, START, TAPS
-from renderer.techniques.screen import output_formats
+from renderer.scene.shapes import triangle_areas
+from renderer.techniques.base import Inputs, Room, Scattered, Technique
+from renderer.techniques.cascade import START
+from renderer.techniques.drawing import Drawing, result
 
-#: Of a blur along an axis; techniques/atlas_gaussian.glsl has room for as many.
-MOST_TAPS = 49
 #: Atlases whose charts overlap by more than this share of their texels are refused.
 MOST_OVERLAP = 0.01
 
 
-class Atlas:
+class Atlas(Drawing):
     """One surface's atlas, and what is drawn over it.
 
     light: irradiance, alpha 1 where the medium scatters; place: position in the world in mm, alpha
-    as there; texel_mm: mm that a texel reaches along u and v. All are (size, size).
+    as there; texel_mm: mm that a texel reaches along u and v. All are (size, size), and given to
+    every pass.
     """
 
-    def __init__(self, inputs: Inputs, drawn: Drawn, size: int):
-        assert inputs.room is not None
-        self.inputs, self.drawn, self.size = inputs, drawn, size
-        self._owned: list[gl.Target] = []
+    def __init__(self, inputs: Inputs, room: Room, drawn: Drawn, size: int):
+        super().__init__(inputs, size, size, linear=True)
+        self.room, self.drawn, self.size = room, drawn, size
         self.light: gl.Texture
-        self.place: gl.Texture
-        self.texel_mm: gl.Texture
 
     def draw_light(self, translucent: bool, texturing: float) -> None:
         """Irradiance, places and the size of texels."""
-        room = self.inputs.room
         self._refuse_overlap()
-        with room.placed(self.drawn, "ATLAS", (self.size, self.size)) as lit:
+        with self.room.placed(self.drawn, "ATLAS", (self.size, self.size)) as lit:
             irradiance, _, albedo, _, transmitted, position = lit.textures
             light = self.target()
-            light.bind()
-            self.inputs.programs("passes/add.frag").use(
-                irradiance=irradiance,
-                transmitted=transmitted,
-                medium=float(room.medium),
-                through=float(translucent),
-                albedo=albedo,
-                texturing=texturing,
+            draw_given(
+                self.inputs.context,
+                self.inputs.programs,
+                light,
+                *(irradiance, transmitted, albedo, self.room.medium),
+                translucent,
+                texturing,
             )
-            gl.draw_fullscreen(self.inputs.context)
+            self.light = self.given["light"] = light.textures[0]
             places = self.target(GL.GL_RGBA32F, GL.GL_RGBA16F)
-            self.draw(places, "techniques/atlas_places.glsl", light=light.textures[0], at=position)
-        self.light = light.textures[0]
-        self.place, self.texel_mm = places.textures
+            self.draw(places, "techniques/atlas_places.glsl", at=position)
+        self.given["place"], self.given["texel_mm"] = places.textures
 
     def mean_texel_mm(self) -> float:
         """The side of a square texel that would cover the surface as often."""
-        part, pose = self.drawn.item.primitive, self.drawn.item.pose
-        world = _areas(part.positions @ pose[:3, :3].T, part.faces)
-        flat = _areas(np.pad(part.texcoord_0, ((0, 0), (0, 1))), part.faces)
+        part = self.drawn.item.primitive
+        world = triangle_areas(self.drawn.item.in_world(part.positions), part.faces).sum()
+        flat = triangle_areas(np.pad(part.texcoord_0, ((0, 0), (0, 1))), part.faces).sum()
         return float(np.sqrt(world / flat) / self.size)
 
     def _refuse_overlap(self) -> None:
         """InputError where charts lie over each other: their light would be one another's."""
-        room, side = self.inputs.room, min(self.size, 512)
+        side = min(self.size, 512)
         with gl.Target(side, side, [GL.GL_RGBA16F]) as target:
             target.bind(clear=(0.0, 0.0, 0.0, 0.0), blend="add")
             program = self.inputs.programs(
                 "techniques/atlas_layers.glsl", {"DOMAIN": "ATLAS"}, vertex="passes/surface.vert"
             )
-            values = {**room.camera, "model": self.drawn.item.pose}
+            values = {**self.room.camera, "model": self.drawn.item.pose}
             program.use(**program.accepts(values))
             self.drawn.mesh.draw()
             layers = target.textures[0].read()[..., 0]
@@ -92,38 +85,6 @@ class Atlas:
                 f"of {layers.size} texels, {int(double)} of them more than once; expected a place "
                 "of its own for each part of the surface, since light is filtered there"
             )
-
-    def target(self, *formats: int) -> gl.Target:
-        """A target of the atlas's size, RGBA32F by default; freed when the atlas is."""
-        made = gl.Target(self.size, self.size, list(formats) or [GL.GL_RGBA32F], linear=True)
-        self._owned.append(made)
-        return made
-
-    def draw(self, into: gl.Target, shader: str, blend: str | None = None, **uniforms) -> None:
-        """One pass over the atlas; those of light, place and texel_mm that a shader has are set."""
-        into.bind(blend=blend)
-        program = self.inputs.programs(shader)
-        shared = {
-            name: getattr(self, name)
-            for name in ("light", "place", "texel_mm")
-            if name not in uniforms and hasattr(self, name)
-        }
-        program.use(**program.accepts(shared), **uniforms)
-        gl.draw_fullscreen(self.inputs.context)
-
-    @contextmanager
-    def run(self) -> Iterator[Atlas]:
-        try:
-            yield self
-        finally:
-            for target in self._owned:
-                target.delete()
-
-
-def _areas(points: np.ndarray, faces: np.ndarray) -> float:
-    """The area of all triangles."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
 
 
 @dataclass(frozen=True)
@@ -158,32 +119,25 @@ class AtlasTechnique(Technique):
         raise NotImplementedError(f"{self.name} does not count")
 
     def scatter(self, inputs: Inputs) -> Scattered:
-        room = inputs.room
-        if room is None:
-            raise ValueError(f"{self.name} needs surfaces, not a picture of them alone")
-        result = gl.Target(inputs.width, inputs.height, output_formats(), depth=room.depth)
-        try:
-            result.bind()
-            inputs.programs("techniques/atlas_start.glsl").use(irradiance=inputs.irradiance)
+        room = inputs.needed_room(self.name)
+        with result(inputs, room.depth) as target:
+            target.bind()
+            inputs.programs(START).use(light=inputs.irradiance, unblurred=np.ones(3), samples=0.0)
             gl.draw_fullscreen(inputs.context)
             for drawn in room.surfaces:
-                self._one(inputs, drawn, result)
-        except BaseException:
-            result.delete()
-            raise
-        return Scattered(result)
+                self._one(inputs, room, drawn, target)
+        return Scattered(target)
 
-    def _one(self, inputs: Inputs, drawn: Drawn, result: gl.Target) -> None:
+    def _one(self, inputs: Inputs, room: Room, drawn: Drawn, target: gl.Target) -> None:
         """Filter one surface's light and draw it where the surface is seen."""
-        room = inputs.room
-        with Atlas(inputs, drawn, self.size).run() as atlas:
+        with Atlas(inputs, room, drawn, self.size) as atlas:
             atlas.draw_light(self.translucent, self.texturing)
             filtered = self.filter(atlas)
             if self.padding:
                 padded = atlas.target()
                 atlas.draw(padded, "techniques/atlas_pad.glsl", source=filtered, reach=self.padding)
                 filtered = padded.textures[0]
-            result.bind(depth_test=True)
+            target.bind(depth_test=True)
             GL.glDepthMask(False)
             program = inputs.programs(
                 "techniques/atlas_seen.glsl", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert"
@@ -197,39 +151,3 @@ class AtlasTechnique(Technique):
             }
             program.use(**program.accepts(values))
             drawn.mesh.draw()
-
-    def stride(self, atlas: Atlas) -> dict[str, Any]:
-        """What every blur's shader is told of seams and of stretch."""
-        even = atlas.mean_texel_mm() if self.stretch == "none" else 0.0
-        return {"stop": int(self.seams == "stop"), "even_mm": even}
-
-
-def blur_of_blurs(
-    technique: AtlasTechnique,
-    atlas: Atlas,
-    blurs: list[tuple[float, np.ndarray]],
-    unblurred: np.ndarray,
-    taps: np.ndarray = TAPS,
-    spacing: float = 1.0,
-) -> gl.Texture:
-    """A weighted sum of Gaussians, each the one before blurred along u and then v (cascade.steps).
-
-    blurs: (sigma in mm of a step, weight (3,)); unblurred (3,): the light's own weight; taps: of
-    an axis, an odd number up to MOST_TAPS, spacing sigmas apart.
-    """
-    row, blurred, total = atlas.target(), atlas.target(), atlas.target()
-    common = {
-        **technique.stride(atlas),
-        "taps": np.pad(taps / taps.sum(), (0, MOST_TAPS - len(taps))),
-        "spacing": spacing,
-        "reach": len(taps) // 2,
-    }
-    atlas.draw(total, START, light=atlas.light, unblurred=unblurred, samples=0.0)
-    source, shader = atlas.light, "techniques/atlas_gaussian.glsl"
-    for sigma, weight in blurs:
-        own = {**common, "sigma": sigma}
-        atlas.draw(row, shader, source=source, axis=(1.0, 0.0), **own)
-        atlas.draw(blurred, shader, source=row.textures[0], axis=(0.0, 1.0), **own)
-        source = blurred.textures[0]
-        atlas.draw(total, ADD, blend="add", source=source, weight=weight)
-    return total.textures[0]

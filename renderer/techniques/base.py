@@ -41,6 +41,12 @@ class Inputs:
     curve: Curve
     room: Room | None = None
 
+    def needed_room(self, technique: str) -> Room:
+        """The room, for techniques that work over another domain than the screen."""
+        if self.room is None:
+            raise ValueError(f"{technique} needs surfaces, not a picture of them alone")
+        return self.room
+
 
 @dataclass(frozen=True)
 class Room:

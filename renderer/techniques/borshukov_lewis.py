@@ -12,17 +12,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from renderer import gl
-from renderer.optics import fits
-from renderer.optics.curve import Curve
 from renderer.parameters import parameter
-from renderer.techniques.atlas import MOST_TAPS, Atlas, AtlasTechnique, blur_of_blurs
+from renderer.techniques.atlas_gaussians import MOST_TAPS, AtlasGaussians
 from renderer.techniques.base import odd
-from renderer.techniques.cascade import gaussian_taps, steps
+from renderer.techniques.cascade import gaussian_taps
 
 
 @dataclass(frozen=True)
-class BorshukovLewis(AtlasTechnique):
+class BorshukovLewis(AtlasGaussians):
     """Blurs of the light map: a narrow and a broad one by default.
 
     The sketch prints no constants of its kernel: `terms` Gaussians are fitted to the medium's
@@ -44,26 +41,7 @@ class BorshukovLewis(AtlasTechnique):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        odd("borshukov_lewis.taps_per_axis", self.taps_per_axis)
+        odd(self.where("taps_per_axis"), self.taps_per_axis)
 
-    def fit(self, curve: Curve) -> fits.GaussianFit:
-        """The Gaussians for a curve."""
-        return fits.gaussian_sum(curve, self.terms)
-
-    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
-        return self.fit(curve).edge(x_mm)
-
-    def self_check(self, curve: Curve) -> None:
-        fit = self.fit(curve)
-        assert np.allclose(fit.weights.sum(axis=0), 1, atol=1e-9)
-        _, _, variance = gaussian_taps(self.taps_per_axis)
-        reached = np.cumsum([sigma**2 * variance for sigma, _ in steps(fit, variance)])
-        assert np.allclose(reached, fit.variance_mm2)
-
-    def taps(self) -> int:
-        return 2 * self.taps_per_axis * self.terms
-
-    def filter(self, atlas: Atlas) -> gl.Texture:
-        taps, spacing, variance = gaussian_taps(self.taps_per_axis)
-        blurs = steps(self.fit(atlas.inputs.curve), variance)
-        return blur_of_blurs(self, atlas, blurs, np.zeros(3), taps, spacing)
+    def axis_taps(self) -> tuple[np.ndarray, float, float]:
+        return gaussian_taps(self.taps_per_axis)

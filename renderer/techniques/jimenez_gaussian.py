@@ -12,17 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from renderer.optics import fits
-from renderer.optics.curve import Curve
 from renderer.parameters import parameter
-from renderer.techniques.cascade import ADD, START, TAPS, TAPS_VARIANCE, steps
+from renderer.techniques.cascade import ADD, START, SumOfGaussians
 from renderer.techniques.screen import Canvas, ScreenTechnique
 
 
 @dataclass(frozen=True)
-class JimenezGaussian(ScreenTechnique):
+class JimenezGaussian(SumOfGaussians, ScreenTechnique):
     """The 2009 filter.
 
     kernel "fitted": `terms` Gaussians nearest to the medium's curve; "published": d'Eon and
@@ -59,35 +55,14 @@ class JimenezGaussian(ScreenTechnique):
     title: ClassVar[str] = "Gaussian"
     paper: ClassVar[str] = "Jimenez et al. 2009, doi:10.1145/1609967.1609970"
 
-    def fit(self, curve: Curve) -> fits.GaussianFit:
-        """The Gaussians for a curve."""
-        if self.kernel == "published":
-            return fits.published_gaussians(curve)
-        return fits.gaussian_sum(curve, self.terms)
-
-    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
-        return self.fit(curve).edge(x_mm)
-
-    def blurs(self, fit: fits.GaussianFit) -> list[tuple[float, np.ndarray]]:
-        """(incremental sigma in mm, weight (3,)) of the Gaussians that are blurred."""
-        all_of_them = steps(fit)
-        return all_of_them if self.first == "blurred" else all_of_them[1:]
-
-    def self_check(self, curve: Curve) -> None:
-        fit = self.fit(curve)
-        assert np.allclose(fit.weights.sum(axis=0), 1, atol=1e-9)
-        variances = [s**2 * TAPS_VARIANCE for s, _ in self.blurs(fit)]
-        skipped = 0.0 if self.first == "blurred" else fit.variance_mm2[0]
-        assert np.allclose(skipped + np.cumsum(variances), fit.variance_mm2[-len(variances) :])
-        assert np.allclose(TAPS, TAPS[::-1])
-
     def passes(self, canvas: Canvas) -> None:
         inputs = canvas.inputs
-        fit = self.fit(inputs.curve)
+        blurs, unblurred = self.blurs(self.fit(inputs.curve))
+        taps, _, _ = self.axis_taps()
         focal = inputs.pixels_per_mm / inputs.supersample  # output pixels at unit distance
         common = {
-            "taps": TAPS / TAPS.sum(),
-            "reach": len(TAPS) // 2,
+            "taps": taps,
+            "reach": len(taps) // 2,
             "alpha": (self.alpha or focal / 1000.0) * inputs.supersample,
             "focal": focal,
             "published": int(self.stretch == "published"),
@@ -96,17 +71,12 @@ class JimenezGaussian(ScreenTechnique):
             "supersample": float(inputs.supersample),
         }
         row, blurred = canvas.target(), canvas.target()
-        blurs = self.blurs(fit)
-        start = {
-            "light": inputs.irradiance,
-            "unblurred": np.zeros(3) if self.first == "blurred" else fit.weights[0],
-            "samples": float(2 * len(TAPS) * len(blurs)),
-        }
-        canvas.draw(canvas.result, START, {}, **start)
+        start = {"light": inputs.irradiance, "unblurred": unblurred, "samples": self.reads()}
+        canvas.draw(canvas.result, START, **start)
         source = inputs.irradiance
         for sigma, weight in blurs:
             own = {**common, "sigma": sigma}
-            canvas.draw(row, self.file(), {}, source=source, axis=(1.0, 0.0), **own)
-            canvas.draw(blurred, self.file(), {}, source=row.textures[0], axis=(0.0, 1.0), **own)
+            canvas.draw(row, self.file(), source=source, axis=(1.0, 0.0), **own)
+            canvas.draw(blurred, self.file(), source=row.textures[0], axis=(0.0, 1.0), **own)
             source = blurred.textures[0]
-            canvas.draw(canvas.result, ADD, {}, blend="add", source=source, weight=weight)
+            canvas.draw(canvas.result, ADD, blend="add", source=source, weight=weight)

@@ -18,9 +18,11 @@ from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
+from renderer.passes.given import draw_given
 from renderer.passes.surfaces import Drawn
+from renderer.scene.shapes import points_on, triangle_areas
 from renderer.techniques.base import Inputs, Scattered, Technique
-from renderer.techniques.screen import output_formats
+from renderer.techniques.drawing import result
 
 MOST_POINTS = 4_000_000
 COLUMNS = 1024  # points a row of their textures
@@ -28,21 +30,13 @@ TABLE = 512  # texels of a profile, 256 to 512 in Rohat 2012, sec. 5.1
 
 
 def spread(
-    positions: np.ndarray, faces: np.ndarray, count: int, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """(triangles (count,), barycentric weights (count, 3), area) of points that each stand for the
-    same area: strata of the running sum of the triangles' areas, then u = 1 - sqrt(x), v =
-    (1 - y) sqrt(x), w = y sqrt(x) (Turk 1990; Rohat 2012, sec. 5.3.2).
-
-    positions (N, 3), faces (M, 3); area in the positions' unit squared.
+    areas: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (count,) and barycentric weights (count, 3) of points that each stand for the same
+    area: one in every stratum of the running sum of the triangles' areas (M,) (Rohat 2012, sec.
+    5.3.2).
     """
-    a, b, c = (positions[faces[:, k]] for k in range(3))
-    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    running = np.cumsum(areas)
-    at = (np.arange(count) + rng.random(count)) / count * running[-1]
-    triangles = np.minimum(np.searchsorted(running, at), len(faces) - 1)
-    x, y = np.sqrt(rng.random(count)), rng.random(count)
-    return triangles, np.column_stack([1 - x, (1 - y) * x, y * x]), float(running[-1])
+    return points_on(areas, (np.arange(count) + rng.random(count)) / count, rng)
 
 
 @dataclass(frozen=True)
@@ -90,20 +84,20 @@ class PointsTechnique(Technique):
         return values
 
     def scatter(self, inputs: Inputs) -> Scattered:
-        room = inputs.room
-        if room is None:
-            raise ValueError(f"{self.name} needs surfaces, not a picture of them alone")
+        room = inputs.needed_room(self.name)
         both = [GL.GL_RGBA32F, GL.GL_RGBA32F]
         table = np.ones((1, TABLE, 4), np.float32)
         table[0, :, :3] = self.table(inputs.curve)
         profile = gl.Texture(TABLE, 1, GL.GL_RGBA32F, linear=True, data=table)
-        result = gl.Target(inputs.width, inputs.height, output_formats())
         try:
-            with gl.Target(inputs.width, inputs.height, both) as sums:
+            with (
+                result(inputs) as target,
+                gl.Target(inputs.width, inputs.height, both) as sums,
+            ):
                 sums.bind(clear=(0.0, 0.0, 0.0, 0.0))
                 for drawn in room.surfaces:
                     self._splat(inputs, drawn, profile, sums)
-                result.bind()
+                target.bind()
                 inputs.programs("techniques/splat_sum.glsl").use(
                     sent=sums.textures[0],
                     arrived=sums.textures[1],
@@ -111,20 +105,16 @@ class PointsTechnique(Technique):
                     normalised=int(self.weights == "normalised"),
                 )
                 gl.draw_fullscreen(inputs.context)
-        except BaseException:
-            result.delete()
-            raise
         finally:
             profile.delete()
-        return Scattered(result)
+        return Scattered(target)
 
     def _splat(self, inputs: Inputs, drawn: Drawn, profile: gl.Texture, sums: gl.Target) -> None:
         """Add one surface's points to the sums."""
-        room = inputs.room
-        part, pose = drawn.item.primitive, drawn.item.pose
-        world = part.positions @ pose[:3, :3].T + pose[:3, 3]
-        a, b, c = (world[part.faces[:, k]] for k in range(3))
-        area = float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        room = inputs.needed_room(self.name)
+        part = drawn.item.primitive
+        areas = triangle_areas(drawn.item.in_world(part.positions), part.faces)
+        area = areas.sum()
         count = max(1, round(area / self.spacing_mm**2))
         if count > MOST_POINTS:
             raise InputError(
@@ -132,23 +122,21 @@ class PointsTechnique(Technique):
                 f"expected at most {MOST_POINTS} points"
             )
         rng = np.random.default_rng([self.seed, drawn.item.mesh])
-        triangles, corners, area = spread(world, part.faces, count, rng)
-        points = room.points(drawn, triangles, corners)
+        points = room.points(drawn, *spread(areas, count, rng))
         size = (COLUMNS, -(-count // COLUMNS))
         placed = room.placed(drawn, "POINTS", size, points, self.spacing_mm)
         try:
             irradiance, _, albedo, _, transmitted, places = placed.textures
             with gl.Target(*size, [GL.GL_RGBA32F]) as light:
-                light.bind()
-                inputs.programs("passes/add.frag").use(
-                    irradiance=irradiance,
-                    transmitted=transmitted,
-                    medium=float(room.medium),
-                    through=float(self.translucent),
-                    albedo=albedo,
-                    texturing=self.texturing,
+                from_scene = (irradiance, transmitted, albedo, room.medium)
+                draw_given(
+                    inputs.context,
+                    inputs.programs,
+                    light,
+                    *from_scene,
+                    self.translucent,
+                    self.texturing,
                 )
-                gl.draw_fullscreen(inputs.context)
                 sums.bind(blend="add")
                 reach = self.reach_mm(inputs.curve)
                 program = inputs.programs(

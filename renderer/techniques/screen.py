@@ -6,67 +6,22 @@ its shader, techniques/NAME.glsl; one of several passes overrides `passes`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from renderer import gl
-from renderer.gl import GL
 from renderer.techniques.base import Inputs, Scattered, Technique
-
-#: Of every technique's result: scattered irradiance, then samples and contrast.
-FORMATS = (GL.GL_RGBA32F, GL.GL_RG16F)
+from renderer.techniques.drawing import Drawing, result
 
 
-def output_formats() -> list[int]:
-    """Formats of a technique's result."""
-    return list(FORMATS)
+class Canvas(Drawing):
+    """The picture: the result, and irradiance, depths and pixels_per_mm for every pass."""
 
-
-class Canvas:
-    """What the passes of one run draw with: the result's target, and others that live as long."""
-
-    def __init__(self, inputs: Inputs):
-        self.inputs = inputs
-        self.result = gl.Target(inputs.width, inputs.height, output_formats())
-        self._scratch: list[gl.Target] = []
-
-    def target(self, *formats: int) -> gl.Target:
-        """Another target of the same size, RGBA32F by default; freed when the run ends."""
-        made = gl.Target(self.inputs.width, self.inputs.height, list(formats) or [GL.GL_RGBA32F])
-        self._scratch.append(made)
-        return made
-
-    def draw(
-        self,
-        into: gl.Target,
-        shader: str,
-        defines: dict[str, Any],
-        blend: str | None = None,
-        **uniforms,
-    ) -> None:
-        """One pass over the whole of a target; irradiance and depth are always given."""
-        into.bind(blend=blend)
-        program = self.inputs.programs(shader, defines)
-        shared = {
-            "irradiance": self.inputs.irradiance,
-            "depths": self.inputs.depths,
-            "pixels_per_mm": self.inputs.pixels_per_mm,
-        }
-        program.use(**program.accepts(shared), **uniforms)
-        gl.draw_fullscreen(self.inputs.context)
-
-    @contextmanager
-    def run(self) -> Iterator[Canvas]:
-        try:
-            yield self
-        except BaseException:
-            self.result.delete()
-            raise
-        finally:
-            for target in self._scratch:
-                target.delete()
+    def __init__(self, inputs: Inputs, result: gl.Target):
+        super().__init__(inputs, inputs.width, inputs.height)
+        self.result = result
+        names = ("irradiance", "depths", "pixels_per_mm")
+        self.given = {name: getattr(inputs, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -93,6 +48,6 @@ class ScreenTechnique(Technique):
         canvas.draw(canvas.result, self.file(), self.defines(), **uniforms)
 
     def scatter(self, inputs: Inputs) -> Scattered:
-        with Canvas(inputs).run() as canvas:
+        with result(inputs) as target, Canvas(inputs, target) as canvas:
             self.passes(canvas)
-        return Scattered(canvas.result)
+        return Scattered(target)

@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 
 from renderer.scene import MASKS, Strands
+from renderer.scene.shapes import points_on, triangle_areas
 from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.person import Hair
 from stimuli.heads.skin import azimuth, smoothstep
@@ -49,15 +50,9 @@ class Roots:
 
 def scatter_roots(scalp: Scalp, density: np.ndarray, count: int, rng: np.random.Generator) -> Roots:
     """`count` roots with probability proportional to area times density (N,)."""
-    a, b, c = (scalp.positions[scalp.faces[:, k]] for k in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    share = area * density[scalp.faces].mean(axis=1)
-    face = np.searchsorted(np.cumsum(share), rng.uniform(0, share.sum(), count))
-    corners = scalp.faces[np.minimum(face, len(scalp.faces) - 1)]
-    u, v = rng.uniform(size=(2, count))
-    root = np.sqrt(u)
-    weights = np.column_stack([1 - root, root * (1 - v), root * v])
-    return _roots(scalp, corners, weights)
+    shares = triangle_areas(scalp.positions, scalp.faces) * density[scalp.faces].mean(axis=1)
+    triangles, weights = points_on(shares, rng.random(count), rng)
+    return _roots(scalp, scalp.faces[triangles], weights)
 
 
 def _roots(scalp: Scalp, corners: np.ndarray, weights: np.ndarray) -> Roots:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from renderer.errors import InputError
-from renderer.parameters import Parameters, parameter, refuse_unknown
+from renderer.parameters import Parameters, parameter, refuse_unknown, weights
 from stimuli.heads.regions import Regions
 
 _COLOUR = {"unit": "linear albedo", "low": 0.0, "high": 1.0}
@@ -76,16 +74,10 @@ class Person(Parameters):
     @classmethod
     def read(cls, table: Mapping[str, Any], where: str) -> Person:
         refuse_unknown(table, cls.names(), where)
-        targets = table.get("targets", {})
-        if not isinstance(targets, Mapping):
-            raise InputError(f"{where}.targets is {targets!r:.60}; expected a table of weights")
-        for name, weight in targets.items():
-            number = isinstance(weight, int | float) and not isinstance(weight, bool)
-            if not number or not math.isfinite(weight) or not -1 <= weight <= 1.5:
-                raise InputError(f"{where}.targets.{name} is {weight!r}; expected -1 to 1.5")
+        targets = weights(f"{where}.targets", table.get("targets", {}), "weights", -1, 1.5)
         arm = super().read({k: v for k, v in table.items() if k == "arm_drop_deg"}, where)
         return cls(
-            dict(targets),
+            targets,
             arm.arm_drop_deg,
             Eyes.read(table.get("eyes", {}), f"{where}.eyes"),
             Hair.read(table.get("hair", {}), f"{where}.hair"),

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, ClassVar
 
 from renderer.errors import InputError
-from renderer.parameters import Parameters, parameter, refuse_unknown
+from renderer.parameters import Parameters, parameter, weights
 
 PLACES = (
     "everywhere",
@@ -106,7 +105,7 @@ class Regions(Parameters):
         for name in _LINES:
             object.__setattr__(self, name, _line(self.where(name), getattr(self, name)))
         for name, default in _WEIGHTS.items():
-            own = _weights(self.where(name), getattr(self, name))
+            own = weights(self.where(name), getattr(self, name), "places", -2, 2, PLACES)
             object.__setattr__(self, name, {**default, **own})
 
 
@@ -123,15 +122,3 @@ def _line(where: str, points: Any) -> tuple[tuple[float, float], ...]:
     if not all(math.isfinite(mm) and abs(mm) <= 500 for _, mm in line):
         raise InputError(f"{where} is {points!r:.60}; expected heights of -500 to 500 mm")
     return line
-
-
-def _weights(where: str, table: Any) -> dict[str, float]:
-    """Weights of places, checked."""
-    if not isinstance(table, Mapping):
-        raise InputError(f"{where} is {table!r:.60}; expected a table of places")
-    refuse_unknown(table, PLACES, where)
-    for place, weight in table.items():
-        number = isinstance(weight, int | float) and not isinstance(weight, bool)
-        if not number or not -2 <= weight <= 2:
-            raise InputError(f"{where}.{place} is {weight!r:.60}; expected -2 to 2")
-    return {place: float(weight) for place, weight in table.items()}

@@ -142,16 +142,16 @@ def test_the_pdf_is_one_with_embedded_fonts_and_no_date(study_report):
         assert content.count(b"/FontFile3") + content.count(b"/FontFile2") >= 2
 
 
+def text_of(report, option):
+    """What pdftotext makes of a PDF's bytes."""
+    command = ["pdftotext", option, "-", "-"]
+    return subprocess.run(command, input=report, capture_output=True, check=True).stdout.decode()
+
+
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no poppler here")
-def test_the_pdf_says_what_the_page_says(tmp_path, study_report):
+def test_the_pdf_says_what_the_page_says(study_report):
     for simulated, files in study_report.items():
-        (tmp_path / "report.pdf").write_bytes(files["report.pdf"])
-        text = subprocess.run(
-            ["pdftotext", "-layout", tmp_path / "report.pdf", "-"],
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
+        text = text_of(files["report.pdf"], "-layout")
         pages = text.split("\f")[:-1]
         assert all((SIMULATED in page) == simulated for page in pages) and len(pages) > 5
         words = " ".join(text.split())
@@ -181,19 +181,13 @@ def test_typst_markup_in_a_name_stays_text():
 
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no poppler here")
-def test_long_names_stay_in_their_columns(tmp_path):
+def test_long_names_stay_in_their_columns():
     """Words of one line of a table do not lie over each other."""
     name = "technique_with_a_rather_long_name_{}"
     rows = tuple((name.format(k), name.format(f"{k}0"), *("0.50 [0.10, 0.90]",) * 4) for k in "123")
     columns = ("A", "B", "Rank-biserial", "Standardised mean", "Contrast, points", "Holm p")
     table = Shown("x", "", columns, (False, False, True, True, True, True), rows)
-    (tmp_path / "one.pdf").write_bytes(pdf.make("t", "= x", [], [], [table], [], [], False))
-    found = subprocess.run(
-        ["pdftotext", "-bbox", tmp_path / "one.pdf", "-"],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+    found = text_of(pdf.make("t", "= x", [], [], [table], [], [], False), "-bbox")
     box = r'xMin="([\d.]+)" yMin="([\d.]+)" xMax="([\d.]+)"'
     lines: dict[str, list[tuple[float, float]]] = {}
     for left, top, right in re.findall(box, found):

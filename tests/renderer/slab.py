@@ -1,5 +1,6 @@
 """A flat slab under a straight edge of light: what a technique answers, in millimetres."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,24 @@ from renderer.techniques.base import Inputs
 from stimuli import scenes
 
 SIZE = (640, 360)
+BALL = {
+    "objects": {"ball": {"shape": "sphere", "radius_mm": 40.0}},
+    "materials": {"ball": {"medium": "deon_luebke"}},
+    "lights": {"sun": {"direction": [0.5, 0.4, 0.8], "irradiance": [3.0, 3.0, 3.0]}},
+    "environment": {"ambient": [0.2, 0.2, 0.2]},
+    "camera": {"framing": "ball", "height_mm": 100.0, "angle": "front"},
+}
+
+
+@contextmanager
+def frame_of_ball(size):
+    """A frame of a ball alone, under one lamp."""
+    graph = scenes.stage(scenes.read_scene(BALL)).graph
+    with (
+        renderer.Renderer(graph, size, 1, rays=8, shadow_map=256) as drawing,
+        drawing.frame() as frame,
+    ):
+        yield frame
 
 
 def edge_response(drawing, technique, curve, pixels_per_mm, depth_mm, tilt_deg=0.0):

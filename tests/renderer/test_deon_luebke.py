@@ -8,26 +8,23 @@ from renderer.errors import InputError
 from renderer.scene import shapes
 from stimuli import scenes
 from stimuli.scenes import staging
-from tests.renderer.slab import lit, places, rms, surface_edge_response, width_mm
+from tests.renderer.slab import (
+    BALL,
+    frame_of_ball,
+    lit,
+    places,
+    rms,
+    surface_edge_response,
+    width_mm,
+)
 from tests.renderer.test_techniques import SKIN
 
 TECHNIQUE = renderer.make("deon_luebke", {"size": 1024, "texturing": 0.0})
-BALL = {
-    "objects": {"ball": {"shape": "sphere", "radius_mm": 40.0}},
-    "materials": {"ball": {"medium": "deon_luebke"}},
-    "lights": {"sun": {"direction": [0.5, 0.4, 0.8], "irradiance": [3.0, 3.0, 3.0]}},
-    "environment": {"ambient": [0.2, 0.2, 0.2]},
-    "camera": {"framing": "ball", "height_mm": 100.0, "angle": "front"},
-}
 
 
 @pytest.fixture(scope="module")
 def ball():
-    graph = scenes.stage(scenes.read_scene(BALL)).graph
-    with (
-        renderer.Renderer(graph, (120, 90), 1, rays=8, shadow_map=256) as drawing,
-        drawing.frame() as frame,
-    ):
+    with frame_of_ball((120, 90)) as frame:
         yield frame
 
 

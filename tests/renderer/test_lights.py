@@ -271,13 +271,12 @@ import hashlib, sys
 import renderer
 from renderer.scene import Camera
 from stimuli import scenes
+from tests.renderer.conftest import small
 staged = scenes.stage(scenes.read_scene(scenes.load_table(sys.argv[1])))
 with renderer.Renderer(staged.graph, (96, 64), 2, rays=8, shadow_map=256) as drawing:
     with drawing.frame() as frame:
         for name in renderer.TECHNIQUES:
-            fewer = {"atlas": {"size": 128}, "points": {"spacing_mm": 4.0}}
-            technique = renderer.make(name, fewer.get(renderer.TECHNIQUES[name].domain, {}))
-            result = frame.render(technique)
+            result = frame.render(small(name))
             data = result.image.tobytes() + result.samples.tobytes()
             print(name, hashlib.sha256(data).hexdigest())
 """

@@ -1,0 +1,35 @@
+"""What a technique is given: the light that enters one medium, over any domain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from renderer import gl
+
+
+def draw_given(
+    context: gl.Context,
+    programs: Callable[..., gl.Program],
+    into: gl.Target,
+    irradiance: gl.Texture,
+    transmitted: gl.Texture,
+    albedo: gl.Texture,
+    medium: int,
+    translucent: bool,
+    texturing: float,
+) -> None:
+    """Draw irradiance with alpha 1 where the medium scatters, 0 elsewhere.
+
+    medium: the id in irradiance's alpha; translucent: with the transmitted light added (Jimenez et
+    al. 2010: before scattering, not shadowed); texturing: times the albedo to this power.
+    """
+    into.bind()
+    programs("passes/given.frag").use(
+        irradiance=irradiance,
+        transmitted=transmitted,
+        albedo=albedo,
+        medium=float(medium),
+        through=float(translucent),
+        texturing=texturing,
+    )
+    gl.draw_fullscreen(context)

@@ -1,0 +1,65 @@
+"""What the passes of a technique draw with: its result, and targets that live as long as a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Self
+
+from renderer import gl
+from renderer.gl import GL
+from renderer.techniques.base import Inputs
+
+#: Of every technique's result: scattered irradiance, then samples and contrast.
+RESULT_FORMATS = (GL.GL_RGBA32F, GL.GL_RG16F)
+
+
+@contextmanager
+def result(inputs: Inputs, depth: gl.Target | None = None) -> Iterator[gl.Target]:
+    """A technique's result, freed if drawing it fails; depth: a target whose depth it shares."""
+    made = gl.Target(inputs.width, inputs.height, list(RESULT_FORMATS), depth=depth or False)
+    try:
+        yield made
+    except BaseException:
+        made.delete()
+        raise
+
+
+class Drawing:
+    """Passes over the whole of targets of one size; use it as a context manager.
+
+    What `given` names is handed to every shader that has a uniform of that name.
+    """
+
+    def __init__(self, inputs: Inputs, width: int, height: int, linear: bool = False):
+        self.inputs, self.width, self.height, self.linear = inputs, width, height, linear
+        self.given: dict[str, Any] = {}
+        self._owned: list[gl.Target] = []
+
+    def target(self, *formats: int) -> gl.Target:
+        """A target of that size, RGBA32F by default; freed when the run ends."""
+        formats = formats or (GL.GL_RGBA32F,)
+        made = gl.Target(self.width, self.height, list(formats), linear=self.linear)
+        self._owned.append(made)
+        return made
+
+    def draw(
+        self,
+        into: gl.Target,
+        shader: str,
+        defines: dict[str, Any] | None = None,
+        blend: str | None = None,
+        **uniforms,
+    ) -> None:
+        """One pass over the whole of a target."""
+        into.bind(blend=blend)
+        program = self.inputs.programs(shader, defines)
+        program.use(**{**program.accepts(self.given), **uniforms})
+        gl.draw_fullscreen(self.inputs.context)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_) -> None:
+        for target in self._owned:
+            target.delete()
