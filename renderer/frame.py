@@ -137,10 +137,8 @@ class Renderer:
 
         def strands(light, program, shared):
             for hair in self.hair:
-                ribbons = hair.shadow_ribbons(light)
                 program.use(**shared, model=np.eye(4))
-                ribbons.draw()
-                ribbons.delete()
+                hair.draw_shadows(light)
 
         self.lamps.draw(
             self.program("passes/shadow.frag", vertex="passes/shadow.vert"), solid, strands

@@ -32,17 +32,20 @@ class Hair:
         light = on.baked.light[root]
         self.environment = np.maximum(np.einsum("nci,ni->nc", light, self.normals), 0)
 
-    def shadow_ribbons(self, light: Light) -> gl.Mesh:
-        """Flat ribbons that face a lamp."""
-        tangent = np.gradient(self.points, axis=1)
-        facing = light.towards if isinstance(light, DistantLight) else light.place - self.points
+    def draw_shadows(self, light: Light) -> None:
+        """Flat ribbons that face a lamp, with the program in use."""
+        for start in range(0, len(self.points), CHUNK):
+            _draw_and_free(self._shadow_ribbons(light, self.points[start : start + CHUNK]))
+
+    def _shadow_ribbons(self, light: Light, points: np.ndarray) -> gl.Mesh:
+        tangent = np.gradient(points, axis=1)
+        facing = light.towards if isinstance(light, DistantLight) else light.place - points
         across = np.cross(tangent, np.asarray(facing, np.float32))
         across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-6)
-        count = self.points.shape[1]
-        taper = np.linspace(1.0, 0.4, count, dtype=np.float32)[None, :, None]
+        taper = np.linspace(1.0, 0.4, points.shape[1], dtype=np.float32)[None, :, None]
         half = 0.5 * SHADOW_WIDTH_MM * self.size * taper * across
-        both = np.stack([self.points - half, self.points + half], axis=2)
-        return gl.Mesh({0: both.reshape(-1, 3)}, ribbon_faces(*self.points.shape[:2]))
+        both = np.stack([points - half, points + half], axis=2)
+        return gl.Mesh({0: both.reshape(-1, 3)}, ribbon_faces(*points.shape[:2]))
 
     def draw(
         self,
@@ -67,9 +70,7 @@ class Hair:
         }
         program.use(**program.accepts(values))
         for start in range(0, len(order), CHUNK):
-            mesh = self._ribbons(order[start : start + CHUNK])
-            mesh.draw()
-            mesh.delete()
+            _draw_and_free(self._ribbons(order[start : start + CHUNK]))
 
     def _ribbons(self, chosen: np.ndarray) -> gl.Mesh:
         """These strands (S,), in their order, as what hair.vert takes."""
@@ -98,6 +99,13 @@ class Hair:
             5: per_strand(self.normals),
         }
         return gl.Mesh(attributes, ribbon_faces(n, p))
+
+
+def _draw_and_free(mesh: gl.Mesh) -> None:
+    """Draw and wait: a software driver keeps what is still to be drawn, deleted or not."""
+    mesh.draw()
+    gl.finish()
+    mesh.delete()
 
 
 def ribbon_faces(strands: int, points: int) -> np.ndarray:
