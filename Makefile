@@ -1,11 +1,12 @@
 # make demo           install what is missing, render the thesis study, simulate its participants, analyse, serve
 # make demo SERVE=0   the same, but end instead of serving
 # make test           install what is missing, check the style, run every test
+# make test-bayes     install the sampler of `subdermal posterior` too, run its tests
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test demo bench clean
+.PHONY: help setup test test-bayes demo bench clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -26,6 +27,12 @@ test:
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/python -m pytest
+
+test-bayes:
+	@tools/setup test
+	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
+		--require-hashes --only-binary :all: -r requirements-bayes.lock
+	.venv/bin/python -m pytest tests/posterior
 
 demo: setup
 	$(SUBDERMAL) build stimuli/studies/thesis.toml --out $(OUT)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import platform
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 
 from analysis.agreement import rules_in_words
@@ -100,10 +100,10 @@ REFERENCES = {
 PACKAGES = ("subdermal", "numpy", "scipy", "pandas", "matplotlib", "typst")
 
 
-def versions() -> dict[str, str]:
-    """Name -> version of what made the numbers and the figures."""
+def versions(further: Iterable[str] = ()) -> dict[str, str]:
+    """Name -> version of what made the numbers and the figures, and of further packages."""
     found = {"Python": platform.python_version()}
-    for name in PACKAGES:
+    for name in (*PACKAGES, *further):
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:

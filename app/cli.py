@@ -13,6 +13,7 @@ VERBS = {
     "serve": "app.commands.serve",
     "simulate": "app.commands.simulate",
     "analyse": "app.commands.analyse",
+    "posterior": "app.commands.posterior",
     "profile": "app.commands.profile",
     "fit": "app.commands.fit",
     "redraw": "app.commands.redraw",

@@ -1,11 +1,18 @@
 """`subdermal analyse`: from a table of answers to tables, figures and a report."""
 
+from __future__ import annotations
+
 import shlex
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from analysis.manifest import ManifestFile
+    from analysis.responses import Responses
 
 #: How many unusable rows are named on the terminal; tables/rejected_rows.csv holds all.
 SHOWN_ROWS = 20
@@ -142,11 +149,9 @@ def command(
     """
     from analysis import declared as declarations
     from analysis.ahp import read_matrices
-    from analysis.codebook import FRAMING, read_manifest
-    from analysis.manifest import is_manifest, open_manifest
+    from analysis.codebook import FRAMING
     from analysis.objective import read_measures
     from analysis.report import report_matrices, report_responses, write_files
-    from analysis.responses import read_responses
 
     if (responses is None) == (matrices is None):
         raise click.UsageError("expected either RESPONSES or --matrices FILE.toml")
@@ -160,22 +165,14 @@ def command(
                 f"{', '.join(unused)} cannot go with --matrices, which has its own names and order"
             )
         found = read_matrices(matrices)
-        files = report_matrices(found, matrices.name, _written(("--matrices", matrices.name)))
+        files = report_matrices(
+            found, matrices.name, written("analyse", ("--matrices", matrices.name))
+        )
         write_files(files, out)
         click.echo(f"{out / 'report.html'}: priorities of {len(found)} matrices")
         return
 
-    notes = ()
-    beside = responses.parent / "manifest.json"
-    if study is None and beside.is_file():
-        if is_manifest(beside):
-            study = beside
-        else:
-            notes = ("The manifest.json beside the table is not one of a study; it was not used.",)
-    manifest = open_manifest(study) if study is not None else None
-    codebook = read_manifest(manifest) if manifest else None
-    answers = read_responses(responses, codebook, order, factor or FRAMING, varied or ())
-    answers = replace(answers, notes=notes + answers.notes)
+    answers, manifest, study = read_answers(responses, study, order, factor, varied)
     options = [
         (option, ",".join(value))
         for option, value in (("--order", order), ("--pair", pair), ("--varied", varied))
@@ -194,7 +191,7 @@ def command(
     files = report_responses(
         answers,
         pair,
-        _written((responses.name,), *options),
+        written("analyse", (responses.name,), *options),
         chosen,
         _source(declared, choices),
         read_measures(manifest, reference, factor or FRAMING) if manifest else None,
@@ -202,10 +199,7 @@ def command(
     )
     write_files(files, out)
 
-    for finding in answers.findings[:SHOWN_ROWS]:
-        click.echo(f"{responses}: {finding}", err=True)
-    for note in answers.notes:
-        click.echo(f"{responses}: {note}", err=True)
+    tell(responses, answers)
     unused = len(answers.findings)
     kind = "simulated answers" if answers.simulated else "answers"
     click.echo(
@@ -236,10 +230,42 @@ def _source(declared: dict, choices: dict) -> str:
     return f"{source}; {', '.join(given)} as given on the command line" if given else source
 
 
-def _written(*parts: tuple[str, ...]) -> str:
-    """The command as it is shown in the report: without folders, so that it says nothing of the
+def read_answers(
+    responses: Path,
+    study: Path | None,
+    order: tuple[str, ...] | None = None,
+    factor: str | None = None,
+    varied: tuple[str, ...] | None = None,
+) -> tuple[Responses, ManifestFile | None, Path | None]:
+    """The answers, with the study's manifest and its path: as given, or beside the table."""
+    from analysis.codebook import FRAMING, read_manifest
+    from analysis.manifest import is_manifest, open_manifest
+    from analysis.responses import read_responses
+
+    notes: tuple[str, ...] = ()
+    beside = responses.parent / "manifest.json"
+    if study is None and beside.is_file():
+        if is_manifest(beside):
+            study = beside
+        else:
+            notes = ("The manifest.json beside the table is not one of a study; it was not used.",)
+    manifest = open_manifest(study) if study is not None else None
+    codebook = read_manifest(manifest) if manifest else None
+    answers = read_responses(responses, codebook, order, factor or FRAMING, varied or ())
+    return replace(answers, notes=notes + answers.notes), manifest, study
+
+
+def tell(path: Path, answers: Responses) -> None:
+    """What is to be known of the table, on stderr: rows that cannot be used, and notes."""
+    for finding in answers.findings[:SHOWN_ROWS]:
+        click.echo(f"{path}: {finding}", err=True)
+    for note in answers.notes:
+        click.echo(f"{path}: {note}", err=True)
+
+
+def written(verb: str, *parts: tuple[str, ...]) -> str:
+    """The command as it is shown in its output: without folders, so that it says nothing of the
     machine and never changes.
     """
-    return shlex.join(
-        ["subdermal", "analyse", *(word for part in parts for word in part), "--out", "DIR"]
-    )
+    words = [word for part in parts for word in part]
+    return shlex.join(["subdermal", verb, *words, "--out", "DIR"])

@@ -12,6 +12,8 @@ from scipy import stats
 from statsmodels.stats.power import TTestPower
 
 from analysis import InputError, read_responses, responses_from_records
+from analysis.compute import everything
+from analysis.conclusions import conclude
 from analysis.inference import pairs, verdict
 from analysis.inference.people import sign_counts, signed_rank_counts
 from analysis.options import Options
@@ -217,6 +219,36 @@ def test_power_decides_as_analyse_does(design, test, family):
                 assert [one in ("equivalent", "both") for one in verdicts] == list(excluded[study])
         if design == "full" and people == 60:
             assert (found if difference else excluded).any()
+
+
+@pytest.mark.parametrize(("difference", "goal"), [(1.6, "find"), (0.0, "exclude")])
+def test_the_whole_report_concludes_as_power_does(difference, goal):
+    """All tables and sentences of simulated studies, not the pair's test alone: a pair that `power`
+    counts as found, or excluded, is said to be so, and no other. `make bench BENCH=power` does it
+    for the thesis's design, with other studies than those that `power` drew.
+    """
+    options = Options(margin=0.5, resamples=100, seed=5, models=("bradley_terry",))
+    run, _ = run_of(
+        plan(techniques=("a", "b", "c"), pair=("a", "b"), most=50, studies=50, options=options),
+        difference=difference,
+    )
+    expected = (run.found(50) if goal == "find" else run.excluded(50))[:, 0]
+    both_kinds = [*np.flatnonzero(expected)[:2], *np.flatnonzero(~expected)[:1]]
+    for study in both_kinds:
+        responses = table_of(run, study, 50)
+        results = everything(responses, options)
+        row = next(r for r in results.tables["pairs"].itertuples() if (r.a, r.b) == ("a", "b"))
+        assert (verdict(row, 0.05) in (VERDICTS[goal], "both")) == expected[study]
+        said = conclude(results.tables, results.notes, responses.codebook, options, 50, False).can
+        about = [one for one in said if re.search(SAID[goal], one)]
+        assert bool(about) == expected[study], (said, expected[study])
+
+
+VERDICTS = {"find": "different", "exclude": "equivalent"}
+SAID = {
+    "find": r"preferred .*(b over [^;(]*\ba\b|a over [^;(]*\bb\b)",
+    "exclude": "a and b are as good",
+}
 
 
 def test_the_margin_is_the_declared_one():

@@ -1,0 +1,224 @@
+"""The files of a posterior: tables, all draws, a figure and posterior.md, doubts first."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from analysis import figures
+from analysis.codebook import Codebook
+from analysis.figures import BLUE, SIMULATED, Picture
+from analysis.methods import versions
+from analysis.options import OVERALL
+from analysis.posterior.model import NEW_IMAGE, PRIORS, STEPS, Posterior
+from analysis.responses import Responses
+
+NAMES = {
+    "sd_image": "spread of what a technique gains in one image",
+    "sd_taste": "spread of people's tastes for a technique",
+    "sd_person_side": "spread of people's leaning to a side",
+    "side": "leaning to the right",
+    "threshold_slight": "from here on a preference",
+    "threshold_clear": "from here on a clear one",
+}
+
+
+def posterior_files(
+    found: Posterior, responses: Responses, level: float = 0.95, command: str = ""
+) -> tuple[dict[str, bytes], list[str]]:
+    """The files, path -> content, and what they say in short, a sentence each, doubts first."""
+    codebook, simulated = responses.codebook, responses.simulated
+    worths, pairs, parameters = found.worths(level), found.pairs(level), found.parameters(level)
+    sentences = [*_doubts(found), *_best(found, worths, codebook), *_images(found, level)]
+    tables = {"posterior_worths": worths, "posterior_pairs": pairs}
+    tables |= {"posterior_parameters": parameters}
+    page = _page(found, responses, tables, sentences, level, command)
+    files = {
+        f"{name}.csv": _csv(table.assign(simulated=int(simulated)))
+        for name, table in tables.items()
+    }
+    files |= {"posterior.npz": found.draws(), "posterior.md": page.encode()}
+    for picture in draw_posterior(worths, codebook, simulated, level):
+        files |= picture.files
+    return files, sentences
+
+
+def _csv(table: pd.DataFrame) -> bytes:
+    return table.to_csv(index=False, float_format="%.6g", lineterminator="\n").encode()
+
+
+def place_label(codebook: Codebook, name: str) -> str:
+    """'All images', 'A new image', or the image's levels."""
+    named = {OVERALL: "All images", NEW_IMAGE: "A new image"}
+    return named.get(name) or codebook.framing_label(name)
+
+
+def _doubts(found: Posterior) -> list[str]:
+    doubts = found.doubts()
+    if not doubts:
+        return []
+    return [
+        f"These draws may not be those of the posterior: {'; '.join(doubts)}. Draw more, or warm "
+        "up longer."
+    ]
+
+
+def _best(found: Posterior, worths: pd.DataFrame, codebook: Codebook) -> list[str]:
+    """Which technique is most probably the best, at each place."""
+    sentences = []
+    for name, rows in worths.groupby("framing", sort=False):
+        row = rows.loc[rows.p_best.idxmax()]
+        sentences.append(
+            f"{place_label(codebook, name)}: {codebook.label(row.technique)} is the best with "
+            f"probability {row.p_best:.2f}."
+        )
+    return sentences
+
+
+def _images(found: Posterior, level: float) -> list[str]:
+    """What one image can change."""
+    if len(found.images) < 2:
+        return ["One kind of image was shown: nothing is said of others."]
+    low, middle, high = np.quantile(found.spread["image"], [(1 - level) / 2, 0.5, (1 + level) / 2])
+    return [
+        f"What a technique gains or loses from image to image spreads by {middle:.2f} logits "
+        f"[{low:.2f}, {high:.2f}]; rows of 'a new image' have that in their intervals."
+    ]
+
+
+def _page(
+    found: Posterior,
+    responses: Responses,
+    tables: dict[str, pd.DataFrame],
+    sentences: list[str],
+    level: float,
+    command: str,
+) -> str:
+    codebook, sampling = responses.codebook, found.sampling
+    percent = f"{100 * level:g} %"
+    lines = ["# What the answers make of the techniques, by a Bayesian model", ""]
+    if responses.simulated:
+        lines += [f"**{SIMULATED}**", ""]
+    lines += [f"- {sentence}" for sentence in sentences]
+    lines += [
+        "",
+        f"{found.answers} answers of {found.people} participants at {len(found.images)} kinds of "
+        f"images. Worths are in logits, 0 is the mean of the techniques, intervals are central and "
+        f"hold {percent} of the posterior. People and images are both samples: a technique's worth "
+        "is that over all images, and what one image adds to it is drawn from a spread of its own.",
+        "",
+        "![Worths](figures/posterior.svg)",
+        "",
+        "| | technique | median | interval | best with probability |",
+        "|---|---|--:|---|--:|",
+    ]
+    for row in tables["posterior_worths"].itertuples():
+        lines.append(
+            f"| {place_label(codebook, row.framing)} | {codebook.label(row.technique)} | "
+            f"{row.median:z.2f} | {row.low:z.2f} to {row.high:z.2f} | {row.p_best:.2f} |"
+        )
+    lines += ["", "## Pairs", "", "| | A | B | A less B | interval | A is better |"]
+    lines += ["|---|---|---|--:|---|--:|"]
+    for row in tables["posterior_pairs"].itertuples():
+        lines.append(
+            f"| {place_label(codebook, row.framing)} | {codebook.label(row.a)} | "
+            f"{codebook.label(row.b)} | {row.median:z.2f} | {row.low:z.2f} to {row.high:z.2f} | "
+            f"{row.p_a_better:.2f} |"
+        )
+    lines += ["", "## The other parameters, and whether the draws can be trusted", ""]
+    lines += ["| | median | interval | R-hat | effective draws |", "|---|--:|---|--:|--:|"]
+    for row in tables["posterior_parameters"].itertuples():
+        name = row.parameter.removeprefix("worth.")
+        label = NAMES.get(name) or f"worth of {codebook.label(name)}"
+        lines.append(
+            f"| {label} | {row.median:z.2f} | {row.low:z.2f} to {row.high:z.2f} | "
+            f"{row.r_hat:.3f} | {row.ess:.0f} |"
+        )
+    priors = ", ".join(
+        f"{name} {value:g}"
+        for name, value in (
+            ("the spread of worths", PRIORS["worth"]),
+            ("of images", PRIORS["image"]),
+            ("of tastes", PRIORS["taste"]),
+            ("of leanings to a side", PRIORS["person_side"]),
+        )
+    )
+    lines += [
+        "",
+        "## How",
+        "",
+        "- Cumulative logits with thresholds symmetric about 0, a side effect, and crossed random "
+        "effects of people and images (`analysis/posterior/model.py`).",
+        f"- Priors, half-normal: {priors}; the steps of the thresholds {STEPS[0]:g} and "
+        f"{STEPS[1]:g}; normal: the side {PRIORS['side']:g} logits.",
+        f"- {sampling.chains} chains of {sampling.draws} draws after {sampling.warmup} of warm-up, "
+        f"No-U-Turn sampler, seed {sampling.seed}.",
+        f"- Answers: {responses.source}, sha256 {responses.sha256}.",
+        "- " + ", ".join(f"{k} {v}" for k, v in versions(("jax", "numpyro")).items()) + ".",
+    ]
+    if command:
+        lines += ["", f"    {command}"]
+    return "\n".join(lines) + "\n"
+
+
+def draw_posterior(
+    worths: pd.DataFrame, codebook: Codebook, simulated: bool = False, level: float = 0.95
+) -> list[Picture]:
+    """Worths over all images, with the pale interval of a new image; then image by image."""
+    places = [name for name in dict.fromkeys(worths.framing) if name != NEW_IMAGE]
+    height = 0.5 + 0.2 * worths.technique.nunique()
+
+    def alt(page: list[str]) -> str:
+        return "; ".join(
+            f"{place_label(codebook, name)}: "
+            + ", ".join(
+                f"{codebook.label(row.technique)} {row.median:z.2f}"
+                for row in worths[worths.framing == name].itertuples()
+            )
+            for name in page
+        )
+
+    return figures._paged(
+        "posterior",
+        "Worths by the Bayesian model",
+        "Posterior medians of worth in logits, 0 the mean of the techniques, with central "
+        f"intervals that hold {100 * level:g} % of the posterior; pale: at an image of the same "
+        "sort that nobody has seen.",
+        figures._chunks(places, 2 * figures._rows_that_fit(height, 0.25)),
+        alt,
+        _ladders,
+        worths,
+        codebook,
+        simulated=simulated,
+    )
+
+
+def _ladders(places: list[str], worths: pd.DataFrame, codebook: Codebook) -> Figure:
+    height = 0.5 + 0.2 * worths.technique.nunique()
+    figure, panels = figures._panels(
+        len(places), min(2, len(places)), height, below_in=0.25, sharex=True
+    )
+    overall = worths[worths.framing == OVERALL].sort_values("median", ascending=False)
+    order = list(overall.technique)
+    for ax, place in zip(panels, places, strict=True):
+        here = worths[worths.framing == place].set_index("technique").loc[order]
+        ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+        if place == OVERALL:
+            new = worths[worths.framing == NEW_IMAGE].set_index("technique")
+            for y, name in enumerate(name for name in order if name in new.index):
+                row = new.loc[name]
+                ax.plot([row.low, row.high], [y, y], color="#bcd9ec", linewidth=5, zorder=1)
+        for y, row in enumerate(here.itertuples()):
+            ax.plot([row.low, row.high], [y, y], color=BLUE, linewidth=1.6, zorder=2)
+            ax.plot(row.median, y, "o", color=BLUE, markersize=4.5, zorder=3)
+        labels = [figures._cut(codebook.label(name), 22) for name in order]
+        ax.set_yticks(range(len(labels)), labels, size=7.5)
+        ax.set_ylim(len(labels) - 0.5, -0.5)
+        ax.set_title(figures._cut(place_label(codebook, place), 34), loc="left")
+        ax.xaxis.set_major_locator(MaxNLocator(7))
+        ax.tick_params(labelbottom=True)
+        ax.grid(axis="x")
+    figure.supxlabel("logits, to the right looks more real", size=8)
+    return figure
