@@ -115,7 +115,7 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
     left, none, right       answers by side; side_p: two-sided binomial p of as many left as right
     same_answer_share       how often the most frequent of the five answers was given, 0 to 1
     circular_triads, zeta   over the framings that were answered in full: the sum and the mean;
-                            empty where none was
+                            empty where none was, or every answer is a tie
     repeats, repeat_share   questions asked again, and how many of those that prefer one both times
                             prefer the same
     agreement_with_others   cosine, -1 to 1, between the participant's preferences and the sums of
@@ -157,8 +157,9 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
             zetas[full] += zeta(circular, len(panel.items))
             whole[full] += 1
             asked_triads[full] += comb(len(panel.items), 3)
-    table["circular_triads"] = np.where(whole > 0, circles, np.nan)
-    table["zeta"] = np.divide(zetas, whole, out=np.full(len(table), np.nan), where=whole > 0)
+    known = (whole > 0) & (decided > 0).to_numpy()  # whoever sees no difference makes no circle
+    table["circular_triads"] = np.where(known, circles, np.nan)
+    table["zeta"] = np.divide(zetas, whole, out=np.full(len(table), np.nan), where=known)
 
     again = responses.repeats
     table["repeats"] = (
@@ -478,6 +479,9 @@ def _consistency(
         sums[here] += np.column_stack([circular, zeta(circular, n), guessed, zeta(guessed, n)])
         framings[here] += 1
         decided, seen = decided + settled.sum(), seen + circular.sum()
+    if not decided:
+        notes.append(f"{name}: no triad is answered without a tie: nothing can go in a circle")
+        sums[:, :2] = np.nan
     sums[:, [1, 3]] /= np.maximum(framings, 1)[:, None]
     values = sums[people]
     draws = bootstrap.totals(values, options) / len(values)
@@ -501,12 +505,12 @@ def _consistency(
 def _pooled(panel: Panel) -> list[tuple]:
     n = len(panel.items)
     counts = by_pair(panel, panel.counts)
-    if n < 3 or not counts.any(axis=1).all():
+    majority = np.sign(counts[:, 3:].sum(axis=1) - counts[:, :2].sum(axis=1)).astype(np.int8)[None]
+    if n < 3 or not counts.any(axis=1).all() or not majority.any():
         return [
             (label, np.nan, np.nan, np.nan, np.nan)
             for label in ("pooled_circular_triads", "pooled_zeta")
         ]
-    majority = np.sign(counts[:, 3:].sum(axis=1) - counts[:, :2].sum(axis=1)).astype(np.int8)[None]
     one = Panel(
         panel.framing,
         panel.items,

@@ -27,7 +27,7 @@ MODEL_NAMES = {
     "thurstone_jod": "Thurstone's case V",
     "ordinal": "the ordinal model",
 }
-#: How many pairs one sentence names.
+#: How many pairs one sentence names; of more it gives the number.
 MOST = 12
 
 
@@ -106,7 +106,7 @@ def _about_pairs(
             for name in order
         )
         largest = probability(max(row.holm_p for row in differing))
-        most = largest if largest.startswith("<") else f"at most {largest}"
+        most = largest.replace("<", "< ") if largest.startswith("<") else f"at most {largest}"
         found.can.append(
             f"{where}: {who} preferred {words} ({_test(options)}, p {most} after Holm's "
             "correction; "
@@ -160,11 +160,20 @@ def _about_pairs(
                 f"{where}: all {len(rows)} pairs are undecided: {tail} for any of them."
             )
         else:
+            them = _pairs(undecided, codebook)
+            if len(undecided) > MOST:
+                them = "them; the table of every pair names them"
             found.cannot.append(
                 f"{where}: {len(undecided)} of {count(len(rows), 'pair')} "
-                f"{'is' if len(undecided) == 1 else 'are'} undecided: {tail} for "
-                f"{_pairs(undecided, codebook)}."
+                f"{'is' if len(undecided) == 1 else 'are'} undecided: {tail} for {them}."
             )
+    alike = [row for row in undecided if np.isnan(row.tost_p)] if options.margin else []
+    if alike:
+        which = "them" if len(alike) == len(undecided) > 1 else _pairs(alike, codebook)
+        found.cannot.append(
+            f"{where}: everyone gave the same answer about {which}: answers without spread allow "
+            "no test of equality."
+        )
 
 
 def _of(tables: Mapping[str, pd.DataFrame], name: str, framing: str) -> pd.DataFrame:
@@ -354,7 +363,7 @@ def _images(codebook: Codebook) -> str:
     if not varied:
         return "for these images alone, of which nothing but the technique was varied"
     return (
-        f"for the images that were shown, in which the technique and {listed(varied)} were "
+        f"for the images that were shown, in which {listed(['technique', *varied])} were "
         "varied and nothing else was"
     )
 
@@ -578,8 +587,9 @@ def _equals(p: float) -> str:
 
 
 def _pairs(rows: list, codebook: Codebook) -> str:
-    names = [f"{codebook.label(row.a)} and {codebook.label(row.b)}" for row in rows[:MOST]]
-    return "; ".join(names) + (f"; and {len(rows) - MOST} more" if len(rows) > MOST else "")
+    if len(rows) > MOST:
+        return f"{len(rows)} pairs, which the table of every pair has"
+    return "; ".join(f"{codebook.label(row.a)} and {codebook.label(row.b)}" for row in rows)
 
 
 def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) -> None:

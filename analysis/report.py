@@ -577,6 +577,8 @@ def _coherence(found: Priorities, chance: float = np.nan) -> str:
     """Saaty's verdict, and how often answers without any preference look as coherent."""
     if found.cr is None:
         return f"There is {found.verdict}."
+    if len(found.vector) < 3:
+        return "Two techniques have one judgement, which nothing can contradict: CR says nothing."
     words = f"The judgements are {found.verdict} by Saaty's rule, CR {found.cr:z.3f}"
     if np.isnan(chance):
         return words + "."

@@ -577,8 +577,8 @@ def _agreement(statistics: list[str], found: pd.DataFrame, codebook: Codebook) -
 
 
 def draw_triads(participants: pd.DataFrame, simulated: bool = False) -> Picture | None:
-    """How consistent and how fast each person was."""
-    if participants.median_rt_ms.notna().sum() == 0:
+    """How consistent and how fast each person was; None where nobody's consistency is known."""
+    if not (participants.median_rt_ms.notna() & participants.zeta.notna()).any():
         return None
     zeta = participants.zeta.dropna()
     return figures._picture(
@@ -587,12 +587,8 @@ def draw_triads(participants: pd.DataFrame, simulated: bool = False) -> Picture 
         "One dot a person: the coefficient of consistency (1: no circular triad) and the "
         "median time of an answer. "
         "Crosses: those whom a declared rule excludes in the second pass.",
-        (
-            f"{len(participants)} people; consistency from {zeta.min():.2f} to {zeta.max():.2f}, "
-            f"median {zeta.median():.2f}"
-        )
-        if len(zeta)
-        else f"{len(participants)} people; no consistency can be told",
+        f"{len(participants)} people; consistency from {zeta.min():.2f} to {zeta.max():.2f}, "
+        f"median {zeta.median():.2f}",
         _participants,
         participants,
         simulated=simulated,
@@ -625,18 +621,7 @@ def _participants(participants: pd.DataFrame) -> Figure:
             label="excluded in the second pass",
         )
         ax.legend(loc="lower right", fontsize=7)
-    if np.isfinite(zeta).any():
-        ax.set_ylim(min(0.0, float(np.nanmin(zeta))) - 0.05, 1.06)
-    else:
-        ax.text(
-            0.5,
-            0.5,
-            "no triads were asked",
-            transform=ax.transAxes,
-            ha="center",
-            style="italic",
-            color="#666666",
-        )
+    ax.set_ylim(min(0.0, float(np.nanmin(zeta))) - 0.05, 1.06)
     ax.set_xlim(left=0)
     ax.set_xlabel("median time of an answer, s")
     ax.set_ylabel("consistency (zeta)")

@@ -38,7 +38,8 @@ class Ordinal:
     """worth, errors (n,): logits and their standard errors; covariance of worth (n, n).
 
     side and side_error: logits to the right; thresholds: logits, with their names; sd_preference,
-    sd_side: spreads over people; log_likelihood of so many answers; prior: whether the fit has one.
+    sd_side: spreads over people, NaN where the model has none; log_likelihood of so many answers;
+    prior: whether the fit has one.
     """
 
     worth: np.ndarray
@@ -325,8 +326,8 @@ class Likelihood:
             side_error=float(np.sqrt(covariance[-1, -1])),
             thresholds=np.cumsum(increments),
             threshold_names=self.names,
-            sd_preference=abs(float(sd_v)),
-            sd_side=abs(float(sd_s)),
+            sd_preference=abs(float(sd_v)) if self.mixed else np.nan,
+            sd_side=abs(float(sd_s)) if self.mixed else np.nan,
             log_likelihood=-self(theta)[0] * self.answers,
             answers=self.answers,
             parameters=len(theta),

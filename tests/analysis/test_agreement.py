@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis import InputError, declared, inference, read_responses
+from analysis import InputError, declared, inference, read_responses, responses_from_records
 from analysis.agreement import (
     PARTICIPANTS,
     agreement,
@@ -28,6 +28,7 @@ from analysis.compute import everything
 from analysis.conclusions import conclude
 from analysis.options import Exclusions, Options
 from analysis.panel import MISSING, panels
+from analysis.worth_figures import draw_triads
 
 FAST = Options(resamples=200, models=("bradley_terry",))
 #: Krippendorff 2011, "Computing Krippendorff's Alpha-Reliability", example C: 4 observers, 12
@@ -502,3 +503,38 @@ def test_choices_are_checked(wrong, words):
     assert "\n" not in str(error.value) and "expected" in str(error.value)
     with pytest.raises(InputError, match="exclusions.zeta"):
         Exclusions(zeta=2)
+
+
+def alike(answer):
+    """Six people who give one and the same answer to every pair."""
+    return responses_from_records(
+        {"participant": f"P{k}", "framing": "f", "left": a, "right": b, "answer": answer}
+        for k in range(6)
+        for a, b in combinations("abc", 2)
+    )
+
+
+def test_ties_alone_make_nobody_consistent():
+    """No triad without a tie: zeta has no number, rather than the 1 of a person without circles."""
+    responses = alike(0)
+    found = values(agreement(responses, FAST), "f").value
+    assert found[["circular_triads", "zeta", "pooled_zeta"]].isna().all()
+    assert found["zeta_guessed"] == pytest.approx(0.75 * 1 + 0.25 * 0)
+    assert participants(responses, FAST).zeta.isna().all()
+    assert participants(alike(1), FAST).zeta.eq(1).all()
+
+
+def test_two_techniques_have_no_tastes_no_circles_and_nothing_to_contradict():
+    """One answer a person: the model has no tastes, so that none of 0.00 is reported."""
+    given = (1, 1, -1, 0, 2, 1, -1, 0, 1)
+    responses = responses_from_records(
+        {"participant": f"P{k}", "framing": "f", "left": "ab"[k % 2], "right": "ba"[k % 2]}
+        | {"answer": answer}
+        for k, answer in enumerate(given)
+    )
+    results = everything(responses, replace(FAST, models=("bradley_terry", "ordinal")))
+    models = results.tables["worth_models"].set_index("parameter").estimate
+    assert np.isnan(models["sd_preference"]) and np.isnan(models["sd_side"])
+    words = conclude(results.tables, results.notes, responses.codebook, FAST, 9, False)
+    assert not any("tastes" in one for one in words.can)
+    assert draw_triads(results.tables["participants"]) is None

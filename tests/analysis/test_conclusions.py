@@ -107,13 +107,34 @@ def test_differences_name_winner_loser_and_the_largest_p():
     assert "as good as each other" not in can
 
 
+def test_pairs_that_all_answer_alike_are_not_called_undecided_without_a_reason():
+    """12 of 12 see no difference: t tests need spread, and the report says so."""
+    alike = {"mean_preference": 0.0, "tost_p": np.nan, "tost_holm_p": np.nan, "holm_p": 1.0}
+    _, cannot = said(tables(pair("a", "b", **alike), pair("b", "c")))
+    assert (
+        "Close-up: everyone gave the same answer about Ay and b: answers without spread allow no "
+        "test of equality."
+    ) in cannot
+    _, cannot = said(tables(pair("a", "b", **alike)), Options())
+    assert "without spread" not in cannot  # no margin: no test of equality was asked for
+
+
+def test_many_undecided_pairs_are_counted_not_listed():
+    names = [f"t{k}" for k in range(6)]
+    rows = [pair(a, b) for k, a in enumerate(names) for b in names[k + 1 :]]
+    _, cannot = said(tables(*rows, pair("a", "b", holm_p=0.01)))
+    assert "15 of 16 pairs are undecided" in cannot
+    assert "is shown for them; the table of every pair names them." in cannot
+    assert "t0 and t1" not in cannot
+
+
 def test_a_preference_for_the_second_turns_the_sentence():
     can, _ = said(
         tables(pair("a", "b", holm_p=0.0001, mean_preference=0.7)),
         Options(margin=0.25, test="sign"),
     )
     assert (
-        "people preferred b over Ay (sign test, p <0.001 after Holm's correction; 1 of 1 pairs)"
+        "people preferred b over Ay (sign test, p < 0.001 after Holm's correction; 1 of 1 pairs)"
         in can
     )
 
