@@ -97,7 +97,7 @@ def interval(draws: np.ndarray, people: int, level: float) -> tuple[np.ndarray, 
     enough = (finite.mean(axis=0) >= LEAST_SHARE) & (people >= FEWEST_PEOPLE)
     if not enough.any():
         return np.full(draws.shape[1:], np.nan)[()], np.full(draws.shape[1:], np.nan)[()]
-    tail = stats.norm.cdf(np.sqrt(people / (people - 1)) * stats.t.ppf((1 - level) / 2, people - 1))
+    tail = _tail(people, level)
     quantile = np.quantile if finite.all() else np.nanquantile
     low, high = quantile(
         np.where(finite, draws, np.nan if enough.all() else np.where(enough, np.nan, 0.0)),
@@ -105,6 +105,13 @@ def interval(draws: np.ndarray, people: int, level: float) -> tuple[np.ndarray, 
         axis=0,
     )
     return np.where(enough, low, np.nan)[()], np.where(enough, high, np.nan)[()]
+
+
+@lru_cache(maxsize=256)
+def _tail(people: int, level: float) -> float:
+    """The percentile at which an expanded interval ends (Hesterberg 2015)."""
+    t = stats.t.ppf((1 - level) / 2, people - 1)
+    return float(stats.norm.cdf(np.sqrt(people / (people - 1)) * t))
 
 
 def score_intervals(responses: Responses, options: Options) -> pd.DataFrame:

@@ -178,6 +178,7 @@ class Likelihood:
         self.answers = int(self.mask.sum())
         self.m = self.cuts.shape[1]
         self.mode = np.zeros((len(self.mask), n))
+        self.known: tuple[np.ndarray, np.ndarray] | None = None  # the last Hessian, and where
 
     def start(self) -> np.ndarray:
         theta = np.zeros(self.n + self.m + (2 if self.mixed else 0))
@@ -296,13 +297,18 @@ class Likelihood:
         return b, Cells(self.category, fixed + (z @ b[..., None])[..., 0], tau)
 
     def information(self, theta: np.ndarray) -> np.ndarray:
-        """The Hessian of the mean, from central differences of the gradient."""
+        """The Hessian of the mean, from central differences of the gradient; that of the last
+        parameters where these are within 1e-6 of them, as after Newton's last step.
+        """
+        if self.known is not None and np.abs(theta - self.known[0]).max() < 1e-6:
+            return self.known[1]
         size, step = len(theta), 1e-4
         rows = [
             (self(theta + step * e)[1] - self(theta - step * e)[1]) / (2 * step)
             for e in np.eye(size)
         ]
-        return (np.array(rows) + np.array(rows).T) / 2
+        self.known = theta, (np.array(rows) + np.array(rows).T) / 2
+        return self.known[1]
 
     def result(self, theta: np.ndarray) -> Ordinal | None:
         information = self.information(theta) * self.answers
@@ -349,6 +355,7 @@ class Quadrature(Likelihood):
     def __init__(self, laplace: Likelihood, theta: np.ndarray):
         laplace(theta)  # leaves the modes and curvatures at theta
         vars(self).update(vars(laplace))
+        self.known = None  # that was the Hessian of another likelihood
         n = self.n
         node, weight = np.polynomial.hermite_e.hermegauss(POINTS)
         z, mass = (
