@@ -1,6 +1,8 @@
 // One question: both images appear at once, one answer is taken, and it is kept here until the server has it.
 // Without this script the form posts by itself; with it, a lost connection loses nothing.
 
+import { watch } from "./pair.js";
+
 const UNSENT = `subdermal:unsent:${location.pathname}`;
 const FIRST_PAUSE_MS = 500, LONGEST_PAUSE_MS = 8000, PATIENCE_MS = 15000;
 let preloaded = []; // keeps the images of the next question alive
@@ -25,6 +27,7 @@ async function begin() {
   const images = [...page.querySelectorAll(".pair img")];
   await Promise.all(images.map((image) => decoded(page, image)));
   say(page, "");
+  watch(page);
   page.classList.add("shown");
   await painted();
   const since = performance.now();

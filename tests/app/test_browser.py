@@ -2,11 +2,16 @@
 of every size.
 """
 
+import base64
+import hashlib
+import io
 import json
 import re
 import shutil
 
+import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import expect, sync_playwright
 from sqlalchemy import select
 
@@ -27,16 +32,17 @@ FLAGS = [
 KEY_OF = {-2: "1", -1: "2", 0: "3", 1: "4", 2: "5"}
 
 
+def chromium_path():
+    names = ("chromium", "chromium-browser", "google-chrome")
+    path = next(filter(None, map(shutil.which, names)), None)
+    assert path, "Chromium is missing; `make setup` installs it"
+    return path
+
+
 @pytest.fixture(scope="module")
 def chromium():
-    path = (
-        shutil.which("chromium")
-        or shutil.which("chromium-browser")
-        or shutil.which("google-chrome")
-    )
-    assert path, "Chromium is missing; `make setup` installs it"
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
         yield browser
         browser.close()
 
@@ -298,6 +304,56 @@ def test_images_are_as_large_as_the_window_allows(page, address, width, height, 
         assert label.evaluate(
             "(l) => l.scrollWidth <= l.clientWidth && l.getBoundingClientRect().height >= 40"
         )
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "ratio"),
+    [(1920, 1080, 1), (1281, 723, 1), (1366, 768, 1.25), (1707, 961, 1.1)]
+    + [(390, 844, 3), (412, 915, 2.625)],
+)
+def test_one_file_is_drawn_alike_on_both_sides(study_dir, chromium, width, height, ratio):
+    """Byte for byte on the screen, at every window and pixel ratio, in both layouts; and the screen
+    shows the pixels of the page's canvas, scaled by nobody. The ratio is the browser's own: that
+    of an emulated screen scales what was drawn at 1.
+    """
+    manifest = json.loads((study_dir / "manifest.json").read_text())
+    noise = np.random.default_rng(0).integers(0, 256, (540, 960, 3)).astype(np.uint8)
+    for one in manifest["images"]:
+        Image.fromarray(noise).save(study_dir / one["file"])
+        one["sha256"] = hashlib.sha256((study_dir / one["file"]).read_bytes()).hexdigest()
+    (study_dir / "manifest.json").write_text(json.dumps(manifest))
+    flags = [f"--force-device-scale-factor={ratio}", f"--window-size={width},{height}"]
+    launch = chromium.browser_type.launch
+    with (
+        running(create_app(study_dir)) as address,
+        launch(executable_path=chromium_path(), args=[*FLAGS, *flags]) as browser,
+        browser.new_context(no_viewport=True) as context,
+    ):
+        page = context.new_page()
+        begin(page, address)
+        assert page.evaluate("devicePixelRatio") == pytest.approx(ratio, abs=1e-6)
+        screen = picture(page.screenshot())
+        canvases = page.locator(".pair canvas")
+        boxes = [canvases.nth(k).bounding_box() for k in (0, 1)]
+        drawn = canvases.first.evaluate("(canvas) => canvas.toDataURL('image/png')")
+    left, right = (
+        screen[slice(*edges(box, "y", "height", ratio)), slice(*edges(box, "x", "width", ratio))]
+        for box in boxes
+    )
+    assert left.std() > 10
+    np.testing.assert_array_equal(left, right)
+    np.testing.assert_array_equal(left, picture(base64.b64decode(drawn.partition(",")[2])))
+
+
+def picture(png):
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+
+
+def edges(box, start, size, ratio):
+    """First device pixel and one past the last; both are whole to within a browser's 1/64 px."""
+    found = [box[start] * ratio, (box[start] + box[size]) * ratio]
+    assert found == pytest.approx([round(edge) for edge in found], abs=0.1)
+    return [round(edge) for edge in found]
 
 
 def test_the_dashboard_refreshes_by_itself(page, address, app):
