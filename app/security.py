@@ -108,6 +108,10 @@ def init(app: Flask) -> None:
 
 def _headers(response: Response) -> Response:
     headers = response.headers
+    # what the visitor calls this server is not repeated: redirects within it have no host
+    place = response.location or ""
+    if place.startswith(request.host_url):
+        response.location = "/" + place.removeprefix(request.host_url)
     headers.setdefault("Content-Security-Policy", CONTENT_POLICY)
     headers["X-Content-Type-Options"] = "nosniff"
     headers["X-Frame-Options"] = "DENY"  # frame-ancestors for browsers that do not know it

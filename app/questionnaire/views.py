@@ -183,6 +183,11 @@ def withdraw_now():
             if participant is None:
                 flash("No participant was given this code. Please check it.")
                 return redirect(url_for(".withdraw"), 303)
+            own = _participant(db)
+            if own is not None and own.id != participant.id:  # whose browser this is goes on
+                flow.withdraw(db, participant)
+                flash("The answers that belong to this code were withdrawn. Yours go on.")
+                return redirect(url_for(_place(db, own)), 303)
             session["visit"] = participant.visit
         elif (participant := _participant(db, lock=True)) is None:
             return redirect(url_for(".withdraw"), 303)

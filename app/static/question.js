@@ -125,9 +125,11 @@ function onKey(event) {
   if (!form || event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
   const options = [...form.querySelectorAll("input[type=radio]")];
   if (options.some((option) => option.matches(":disabled"))) return;
-  const elsewhere = !options.includes(event.target);
-  if (/^[1-5]$/.test(event.key)) choose(options[Number(event.key) - 1]);
-  else if (event.key.startsWith("Arrow") && elsewhere) choose(options.find((option) => option.checked) || options[2]);
+  const elsewhere = !options.includes(event.target), chosen = options.find((option) => option.checked);
+  const digit = /^[1-5]$/.test(event.key) ? event.key : /^Digit([1-5])$/.exec(event.code)?.[1]; // AZERTY has them above Shift
+  if (digit) choose(options[Number(digit) - 1]);
+  else if (event.key.startsWith("Arrow") && !chosen) choose(options[/Left|Up/.test(event.key) ? 1 : 3]); // from the middle, to a side
+  else if (event.key.startsWith("Arrow") && elsewhere) choose(chosen);
   else if (event.key === "Enter" && !event.target.closest("a, button")) form.requestSubmit();
   else return;
   event.preventDefault();

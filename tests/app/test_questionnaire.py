@@ -275,6 +275,22 @@ def test_withdrawing_by_code_from_another_device(app, person):
     assert somebody.path == "/withdrawn"
 
 
+def test_withdrawing_anothers_code_leaves_the_own_questions_where_they_were(person):
+    finished = person().begin().answer(*[0] * 30)
+    code = re.search(r'id="completion-code">(\w+)<', finished.page.text)[1]
+    somebody = person().begin().answer(1, 2)
+    somebody.get("/withdraw")
+    somebody.page = somebody.http.post(
+        "/withdraw",
+        data={"csrf_token": somebody.form("csrf_token")["csrf_token"], "code": code},
+        follow_redirects=True,
+    )
+    assert somebody.path == "/question" and "Yours go on" in somebody.page.text
+    assert somebody.answer(2).answers == [1, 2, 2]
+    finished.get("/thanks")
+    assert finished.path == "/withdrawn"
+
+
 def test_another_person_on_the_same_device(person):
     somebody = person().begin().answer(*[0] * 30)
     somebody.page = somebody.http.post(

@@ -235,9 +235,17 @@ def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(
     codes = [somebody.send("password", password="wrong").status_code for _ in range(5)]
     form = somebody.form("password")
     assert codes == [401] * 5
-    assert (
-        somebody.http.post("/dashboard/login", data=form | {"password": secret}).status_code == 429
-    )
+    wrong = somebody.http.post("/dashboard/login", data=form | {"password": "wrong"})
+    assert wrong.status_code == 429
+    right = somebody.http.post("/dashboard/login", data=form | {"password": secret})
+    assert right.status_code == 303  # guesses lock nobody out
+
+
+@pytest.mark.parametrize("path", ["/dashboard", "/dashboard/report", "/question", "/dashboard/"])
+def test_redirects_do_not_repeat_the_host_that_a_visitor_names(app, path):
+    found = app.test_client().get(path, headers={"Host": "evil.example"})
+    assert found.status_code in (303, 308)
+    assert found.headers["Location"].startswith("/") and "evil" not in str(found.headers)
 
 
 def test_the_limiter_forgets_with_time_and_after_success(monkeypatch):
