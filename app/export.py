@@ -10,7 +10,7 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
@@ -281,6 +281,28 @@ def responses_csv(session: Session, study: Study, *, simulated: bool) -> Iterato
     """responses.csv, a chunk at a time."""
     names = [column.name for column in columns(study)]
     return _csv(names, (row.values() for row in records(session, study, simulated=simulated)))
+
+
+def completed_on(session: Session, code: str) -> date | None:
+    """The day on which a completion code was given; None where it was not."""
+    asked = select(Participant.completed_at).where(Participant.completion_code == code)
+    found = session.scalar(asked) if code else None
+    return None if found is None else found.date()
+
+
+def completions_csv(session: Session) -> Iterator[str]:
+    """completions.csv: a row for each completion code, to pay by; in the codes' order, so that it
+    does not say who gave which answers.
+    """
+    given = select(Participant).where(Participant.completion_code.is_not(None))
+    found = session.scalars(given.order_by(Participant.completion_code))
+    return _csv(
+        ("completion_code", "completed_on", "withdrawn"),
+        (
+            (one.completion_code, one.completed_at.date().isoformat(), int(bool(one.withdrawn_at)))
+            for one in found
+        ),
+    )
 
 
 def codebook_csv(study: Study) -> Iterator[str]:

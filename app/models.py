@@ -24,6 +24,11 @@ def now() -> datetime:
     return datetime.now(UTC)
 
 
+def plain_code(text: str) -> str:
+    """A code as it is stored, however it was typed."""
+    return "".join(text.split()).replace("-", "").upper()
+
+
 class UtcDateTime(TypeDecorator):
     """An aware UTC time in every database (SQLite keeps no time zone of its own)."""
 
@@ -86,7 +91,9 @@ class Participant(Base):
     visit: Mapped[str] = mapped_column(String(64), unique=True)  # random, from the signed cookie
     consented_at: Mapped[datetime] = mapped_column(default=now)
     familiarity: Mapped[int | None]
-    completion_code: Mapped[str | None] = mapped_column(String(16), unique=True)
+    completion_code: Mapped[str | None] = mapped_column(String(16), unique=True)  # to be shown
+    # to be kept; None: completed before there was one, when the code did both
+    withdrawal_key: Mapped[str | None] = mapped_column(String(16), index=True, unique=True)
     completed_at: Mapped[datetime | None]
     withdrawn_at: Mapped[datetime | None]
 

@@ -41,7 +41,7 @@ REPORT_POLICY = "; ".join(
     )
 )
 #: A participant may come back to withdraw within this time from the same browser (later by the
-#: completion code).
+#: withdrawal key).
 COOKIE_LIFETIME = timedelta(days=60)
 
 

@@ -19,6 +19,7 @@ from flask import (
 
 from app import export
 from app.dashboard import live, password
+from app.models import plain_code
 from app.security import REPORT_POLICY, Limiter
 from app.web import database, simulated, study, wants_json
 
@@ -97,6 +98,27 @@ def responses_csv():
         response.headers["X-Row-Count"] = str(rows)
         response.call_on_close(opened.pop_all().close)
     return response
+
+
+@blueprint.get("/completions.csv")
+def completions_csv():
+    """Which completion codes are real: for paying, without a word of the answers."""
+    with database().read() as db:
+        body = "".join(export.completions_csv(db))
+    return _download(body, "completions.csv")
+
+
+@blueprint.post("/completion")
+def completion():
+    """Whether a code that somebody shows was given here."""
+    code = plain_code(request.form.get("code", ""))
+    with database().read() as db:
+        found = export.completed_on(db, code)
+    if found is None:
+        flash(f"{code or 'No code'}: not given by this study.")
+    else:
+        flash(f"{code}: completed on {found:%Y-%m-%d}.")
+    return redirect(url_for(".index"), 303)
 
 
 @blueprint.get("/codebook.csv")

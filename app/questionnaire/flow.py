@@ -15,7 +15,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.assignment import assign
-from app.models import Event, Participant, Response, Trial, now
+from app.models import Event, Participant, Response, Trial, now, plain_code
 from app.study import Study
 
 #: No letters or digits that look alike; 10 of them are 48 bits.
@@ -164,8 +164,8 @@ _RECORDED = tuple(name for name in Answer.__dataclass_fields__ if name not in ("
 
 
 def complete(session: Session, participant: Participant) -> bool:
-    """Give the completion code once as many answers are committed as there are trials; whether it
-    is given.
+    """Give the completion code and the withdrawal key once as many answers are committed as there
+    are trials; whether they are given.
 
     Call it in a transaction of its own, after the one of the last answer: what it counts is on the
     disk.
@@ -175,7 +175,7 @@ def complete(session: Session, participant: Participant) -> bool:
     asked = session.scalar(select(func.count()).where(Trial.participant_id == participant.id))
     if not asked or asked != count_answers(session, participant) or participant.withdrawn_at:
         return False
-    participant.completion_code = "".join(secrets.choice(CODE_ALPHABET) for _ in range(CODE_LENGTH))
+    participant.completion_code, participant.withdrawal_key = _secret(), _secret()
     participant.completed_at = now()
     _note(session, participant, "completed")
     return True
@@ -190,14 +190,18 @@ def withdraw(session: Session, participant: Participant) -> None:
         _note(session, participant, "withdrew")
 
 
-def find_by_code(session: Session, code: str) -> Participant | None:
-    """The participant who was given a completion code, however it was typed."""
-    plain = "".join(code.split()).replace("-", "").upper()
-    return (
-        session.scalar(select(Participant).where(Participant.completion_code == plain))
-        if plain
-        else None
-    )
+def _secret() -> str:
+    return "".join(secrets.choice(CODE_ALPHABET) for _ in range(CODE_LENGTH))
+
+
+def find_by_key(session: Session, key: str) -> Participant | None:
+    """The participant who was given a withdrawal key, however it was typed; for those who were
+    given none, the completion code.
+    """
+    plain = plain_code(key)
+    old = Participant.withdrawal_key.is_(None) & (Participant.completion_code == plain)
+    asked = select(Participant).where((Participant.withdrawal_key == plain) | old)
+    return session.scalar(asked) if plain else None
 
 
 def _note(

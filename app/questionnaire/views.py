@@ -174,19 +174,19 @@ def withdraw():
 
 @blueprint.post("/withdraw")
 def withdraw_now():
-    """Withdraw this browser's participant, or the one who was given a completion code."""
+    """Withdraw this browser's participant, or the one who was given a withdrawal key."""
     with database().write() as db:
         if "code" in request.form:
             if not _code_attempts.allow(request.remote_addr):
-                abort(429, "Too many codes were tried. Wait five minutes and try again.")
-            participant = flow.find_by_code(db, request.form["code"])
+                abort(429, "Too many keys were tried. Wait five minutes and try again.")
+            participant = flow.find_by_key(db, request.form["code"])
             if participant is None:
-                flash("No participant was given this code. Please check it.")
+                flash("No participant was given this key. Please check it.")
                 return redirect(url_for(".withdraw"), 303)
             own = _participant(db)
             if own is not None and own.id != participant.id:  # whose browser this is goes on
                 flow.withdraw(db, participant)
-                flash("The answers that belong to this code were withdrawn. Yours go on.")
+                flash("The answers that belong to this key were withdrawn. Yours go on.")
                 return redirect(url_for(_place(db, own)), 303)
             session["visit"] = participant.visit
         elif (participant := _participant(db, lock=True)) is None:

@@ -2,7 +2,8 @@
 
 import csv
 import io
-from datetime import timedelta
+import re
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import func, select
@@ -187,3 +188,20 @@ def test_what_happened_is_kept_as_events(person, app):
     with app.extensions["database"].read() as db:
         counts = dict(db.execute(select(Event.kind, func.count()).group_by(Event.kind)).all())
     assert counts == {"consented": 1, "rated": 1, "shown": 30, "completed": 1, "withdrew": 1}
+
+
+def test_completion_codes_can_be_checked_and_say_nothing_else(person, experimenter):
+    somebody = person().begin().answer(*[0] * 30)
+    person().begin().answer(0)
+    code = re.search(r'id="completion-code">(\w+)<', somebody.page.text)[1]
+    key = re.search(r'id="withdrawal-key">(\w+)<', somebody.page.text)[1]
+    rows = experimenter.get("/dashboard/completions.csv").text.splitlines()
+    today = datetime.now(UTC).date().isoformat()
+    assert rows == ["completion_code,completed_on,withdrawn", f"{code},{today},0"]
+    experimenter.get("/dashboard/")
+    experimenter.send("code", code=f"{code[:4].lower()} {code[4:]}")
+    assert f"{code}: completed on {today}." in experimenter.page.text
+    for other in (key, "<script>"):
+        experimenter.send("code", code=other)
+        assert "not given by this study" in experimenter.page.text
+    assert "<script>" not in experimenter.page.text and key not in "".join(rows)

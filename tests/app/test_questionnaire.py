@@ -264,11 +264,13 @@ def test_withdrawn_answers_stay_in_the_database_and_end_the_questions(person):
 
 def test_withdrawing_by_code_from_another_device(app, person):
     somebody = person().begin().answer(*[0] * 30)
-    code = re.search(r'id="completion-code">(\w+)<', somebody.page.text)[1]
+    paid = re.search(r'id="completion-code">(\w+)<', somebody.page.text)[1]
+    code = re.search(r'id="withdrawal-key">(\w+)<', somebody.page.text)[1]
     elsewhere = person()
     elsewhere.get("/withdraw")
-    elsewhere.send("code", code="WRONGCODE2")
-    assert "No participant was given this code" in elsewhere.page.text
+    for wrong in ("WRONGCODE2", paid):  # whoever pays sees the code, and cannot withdraw by it
+        elsewhere.send("code", code=wrong)
+        assert "No participant was given this key" in elsewhere.page.text
     elsewhere.send("code", code=f" {code[:5].lower()}-{code[5:]} ")
     assert elsewhere.path == "/withdrawn"
     somebody.get("/thanks")
@@ -277,7 +279,7 @@ def test_withdrawing_by_code_from_another_device(app, person):
 
 def test_withdrawing_anothers_code_leaves_the_own_questions_where_they_were(person):
     finished = person().begin().answer(*[0] * 30)
-    code = re.search(r'id="completion-code">(\w+)<', finished.page.text)[1]
+    code = re.search(r'id="withdrawal-key">(\w+)<', finished.page.text)[1]
     somebody = person().begin().answer(1, 2)
     somebody.get("/withdraw")
     somebody.page = somebody.http.post(
@@ -289,6 +291,19 @@ def test_withdrawing_anothers_code_leaves_the_own_questions_where_they_were(pers
     assert somebody.answer(2).answers == [1, 2, 2]
     finished.get("/thanks")
     assert finished.path == "/withdrawn"
+
+
+def test_who_completed_before_there_were_keys_withdraws_by_the_code(app, person):
+    somebody = person().begin().answer(*[0] * 30)
+    with app.extensions["database"].write() as db:
+        one = db.get(Participant, 1)
+        one.withdrawal_key, code = None, one.completion_code
+    somebody.get("/thanks")
+    assert 'id="withdrawal-key"' not in somebody.page.text
+    elsewhere = person()
+    elsewhere.get("/withdraw")
+    elsewhere.send("code", code=code)
+    assert elsewhere.path == "/withdrawn"
 
 
 def test_another_person_on_the_same_device(person):

@@ -22,6 +22,7 @@ POSTS = [
     "/another",
     "/dashboard/login",
     "/dashboard/logout",
+    "/dashboard/completion",
     "/simulation/",
 ]
 CLOSED = [
@@ -30,6 +31,7 @@ CLOSED = [
         "",
         "live.json",
         "responses.csv",
+        "completions.csv",
         "codebook.csv",
         "codebook.md",
         "report/",
