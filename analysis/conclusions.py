@@ -28,7 +28,7 @@ MODEL_NAMES = {
     "ordinal": "the ordinal model",
 }
 #: How many pairs one sentence names; of more it gives the number.
-MOST = 12
+MOST = 8
 
 
 @dataclass
@@ -195,7 +195,11 @@ def _about_disagreements(
     kind of disagreement.
     """
     level = f"{100 * (1 - alpha):g} %"
-    undecided = [row for row in rows.itertuples() if verdict(row, alpha) == "undecided"]
+    undecided = [
+        row
+        for row in rows.itertuples()
+        if verdict(row, alpha) == "undecided" and np.isfinite(row.holm_p)  # tested
+    ]
     other = {(row.a, row.b): row for row in contrasts.itertuples()}
 
     def excludes(row: object, low: str, high: str) -> bool:

@@ -119,6 +119,14 @@ def test_pairs_that_all_answer_alike_are_not_called_undecided_without_a_reason()
     assert "without spread" not in cannot  # no margin: no test of equality was asked for
 
 
+def test_pairs_that_were_not_tested_are_in_no_sentence_about_undecided_ones():
+    """An interval of three people's answers excludes 0: the pair was never tested."""
+    untested = {"holm_p": np.nan, "n": 3, "low": 0.4, "high": 1.2, "equivalent": np.nan}
+    _, cannot = said(tables(pair("a", "b", **untested), pair("b", "c", low=-0.2, high=0.4)))
+    assert "too few people answered to test Ay and b" in cannot
+    assert "of the undecided pairs" not in cannot
+
+
 def test_many_undecided_pairs_are_counted_not_listed():
     names = [f"t{k}" for k in range(6)]
     rows = [pair(a, b) for k, a in enumerate(names) for b in names[k + 1 :]]
