@@ -505,21 +505,15 @@ def _consistency(
 def _pooled(panel: Panel) -> list[tuple]:
     n = len(panel.items)
     counts = by_pair(panel, panel.counts)
-    majority = np.sign(counts[:, 3:].sum(axis=1) - counts[:, :2].sum(axis=1)).astype(np.int8)[None]
+    majority = np.sign(counts[:, 3:].sum(axis=1) - counts[:, :2].sum(axis=1))
     if n < 3 or not counts.any(axis=1).all() or not majority.any():
         return [
             (label, np.nan, np.nan, np.nan, np.nan)
             for label in ("pooled_circular_triads", "pooled_zeta")
         ]
-    one = Panel(
-        panel.framing,
-        panel.items,
-        panel.participants[:1],
-        *np.triu_indices(n, 1),
-        majority,
-        majority == 0,
-    )
-    circular = triads(one)[0][0]
+    preferred = np.zeros((n, n))
+    preferred[np.triu_indices(n, 1)] = -majority
+    circular = circular_triads(preferred)
     return [
         ("pooled_circular_triads", circular, np.nan, np.nan, np.nan),
         ("pooled_zeta", zeta(circular, n), np.nan, np.nan, np.nan),

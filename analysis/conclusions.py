@@ -105,8 +105,7 @@ def _about_pairs(
             f"{codebook.label(name)} over {listed([codebook.label(one) for one in over[name]])}"
             for name in order
         )
-        largest = probability(max(row.holm_p for row in differing))
-        most = largest.replace("<", "< ") if largest.startswith("<") else f"at most {largest}"
+        most = _equals(max(row.holm_p for row in differing)).replace("=", "at most")
         found.can.append(
             f"{where}: {who} preferred {words} ({_test(options)}, p {most} after Holm's "
             "correction; "
@@ -150,7 +149,7 @@ def _about_pairs(
     if untested:
         which = "any pair" if len(untested) == len(rows) else _pairs(untested, codebook)
         found.cannot.append(f"{where}: too few people answered to test {which}.")
-    undecided = [row for row in by["undecided"] if np.isfinite(row.holm_p)]
+    undecided = _undecided(rows, alpha)
     if undecided:
         tail = "neither a difference nor equality is shown"
         if not options.margin and not options.margin_jod:
@@ -176,6 +175,12 @@ def _about_pairs(
         )
 
 
+def _undecided(rows: pd.DataFrame, alpha: float) -> list:
+    """The pairs that were tested and came to nothing."""
+    tested = rows[np.isfinite(rows.holm_p)]
+    return [row for row in tested.itertuples() if verdict(row, alpha) == "undecided"]
+
+
 def _of(tables: Mapping[str, pd.DataFrame], name: str, framing: str) -> pd.DataFrame:
     """The rows of a table at a framing; none where the table was not made."""
     if name not in tables:
@@ -195,11 +200,7 @@ def _about_disagreements(
     kind of disagreement.
     """
     level = f"{100 * (1 - alpha):g} %"
-    undecided = [
-        row
-        for row in rows.itertuples()
-        if verdict(row, alpha) == "undecided" and np.isfinite(row.holm_p)  # tested
-    ]
+    undecided = _undecided(rows, alpha)
     other = {(row.a, row.b): row for row in contrasts.itertuples()}
 
     def excludes(row: object, low: str, high: str) -> bool:

@@ -6,6 +6,10 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @contextmanager
@@ -20,3 +24,9 @@ def replacing(path: Path) -> Iterator[Path]:
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def csv_bytes(table: pd.DataFrame, digits: int) -> bytes:
+    """A table as CSV in UTF-8, numbers to so many digits."""
+    text = table.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n")
+    return text.encode()

@@ -34,7 +34,7 @@ from analysis.conclusions import count as _count
 from analysis.conclusions import listed as _listed
 from analysis.declared import UNDECLARED
 from analysis.errors import InputError
-from analysis.files import replacing
+from analysis.files import csv_bytes, replacing
 from analysis.methods import rejected_rows
 from analysis.methods import versions as _versions
 from analysis.objective import Measured
@@ -288,12 +288,7 @@ def _files(
     more: Mapping[str, bytes],
     **page: object,
 ) -> dict[str, bytes]:
-    files = {
-        f"tables/{name}.csv": table.to_csv(
-            index=False, float_format="%.10g", lineterminator="\n"
-        ).encode()
-        for name, table in tables.items()
-    }
+    files = {f"tables/{name}.csv": csv_bytes(table, 10) for name, table in tables.items()}
     for picture in pictures:
         files |= picture.files
     files |= more

@@ -257,6 +257,17 @@ def draw_ladder(
     )
 
 
+def rungs(ax: Axes, labels: list[str]) -> None:
+    """A ladder's axes: a rung a label, the first on top, and a line at 0."""
+    ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+    labels = [figures._cut(label, 22) for label in labels]
+    ax.set_yticks(range(len(labels)), labels, size=7.5)
+    ax.set_ylim(len(labels) - 0.5, -0.5)
+    ax.xaxis.set_major_locator(MaxNLocator(7))
+    ax.tick_params(labelbottom=True)
+    ax.grid(axis="x")
+
+
 def _ladder(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
     most = found.groupby("framing", sort=False).size().max()
     figure, panels = figures._panels(
@@ -264,16 +275,10 @@ def _ladder(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Fig
     )
     for ax, framing in zip(panels, framings, strict=True):
         here = found[found.framing == framing].sort_values("estimate", ascending=False)
-        ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
         for place, row in enumerate(here.itertuples()):
             _interval(ax, row.estimate, row.low, row.high, place)
-        labels = [figures._cut(codebook.label(name), 22) for name in here.technique]
-        ax.set_yticks(range(len(labels)), labels, size=7.5)
-        ax.set_ylim(len(labels) - 0.5, -0.5)
+        rungs(ax, [codebook.label(name) for name in here.technique])
         ax.set_title(starred(framing, found, codebook, 34), loc="left")
-        ax.xaxis.set_major_locator(MaxNLocator(7))
-        ax.tick_params(labelbottom=True)
-        ax.grid(axis="x")
     figure.supxlabel("JOD, to the right looks more real", size=8)
     return figure
 

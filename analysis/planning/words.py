@@ -9,6 +9,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis.codebook import Codebook
+from analysis.files import csv_bytes
 from analysis.methods import versions
 from analysis.planning.answering import SIGMA
 from analysis.planning.plan import ANY, Plan
@@ -44,8 +45,8 @@ def power_files(
     picture = draw_power(curves[curves.framing == first], plan, names, codebook)
     sentences = [*_needs(plan, needed, codebook), *_adaptive(plan, needed, codebook)]
     files = {
-        "power.csv": _csv(curves.assign(simulated=1)),
-        "needed.csv": _csv(needed.assign(simulated=1)),
+        "power.csv": csv_bytes(curves.assign(simulated=1), 6),
+        "needed.csv": csv_bytes(needed.assign(simulated=1), 6),
         "power.md": _page(plan, needed, sentences, codebook, source, command, fingerprint).encode(),
     } | picture.files
     return files, sentences
@@ -122,10 +123,6 @@ def _adaptive(plan: Plan, needed: pd.DataFrame, codebook: Codebook) -> list[str]
 
 def _people(count: float, plan: Plan) -> str:
     return f"more than {plan.most}" if math.isnan(count) else f"{count:.0f}"
-
-
-def _csv(table: pd.DataFrame) -> bytes:
-    return table.to_csv(index=False, float_format="%.6g", lineterminator="\n").encode()
 
 
 def _page(

@@ -99,7 +99,7 @@ class Posterior:
         worth.
         """
         rows = []
-        for name, draws in self._places().items():
+        for name, draws in self._places.items():
             best = np.bincount(draws.argmax(axis=1), minlength=len(self.techniques)) / len(draws)
             for k, technique in enumerate(self.techniques):
                 rows.append((name, technique, *_summary(draws[:, k], level), best[k]))
@@ -110,7 +110,7 @@ class Posterior:
     def pairs(self, level: float = 0.95) -> pd.DataFrame:
         """framing, a, b, median, low, high, p_a_better: of worth of a less worth of b."""
         rows = []
-        for name, draws in self._places().items():
+        for name, draws in self._places.items():
             for i, j in combinations(range(len(self.techniques)), 2):
                 apart = draws[:, i] - draws[:, j]
                 names = (self.techniques[i], self.techniques[j])
@@ -118,30 +118,37 @@ class Posterior:
         columns = ["framing", "a", "b", "median", "low", "high", "p_a_better"]
         return pd.DataFrame(rows, columns=columns)
 
-    def parameters(self, level: float = 0.95) -> pd.DataFrame:
-        """parameter, median, low, high, r_hat, ess; spreads, side, thresholds and worths."""
-        from numpyro.diagnostics import effective_sample_size, split_gelman_rubin
-
+    @cached_property
+    def _named(self) -> dict[str, np.ndarray]:
+        """Name -> draws (chains, draws) of spreads, side, thresholds and worths."""
         named = {f"sd_{name}": draws for name, draws in self.spread.items()}
         named |= {"side": self.side}
         named |= {
             f"threshold_{k}": self.thresholds[..., i] for i, k in enumerate(("slight", "clear"))
         }
         named |= {f"worth.{name}": self.worth[..., k] for k, name in enumerate(self.techniques)}
+        return named
+
+    @cached_property
+    def trust(self) -> pd.DataFrame:
+        """parameter, r_hat, ess."""
+        from numpyro.diagnostics import effective_sample_size, split_gelman_rubin
+
         rows = [
-            (
-                name,
-                *_summary(draws.ravel(), level),
-                float(split_gelman_rubin(draws)),
-                float(effective_sample_size(draws)),
-            )
-            for name, draws in named.items()
+            (name, float(split_gelman_rubin(draws)), float(effective_sample_size(draws)))
+            for name, draws in self._named.items()
         ]
-        return pd.DataFrame(rows, columns=["parameter", "median", "low", "high", "r_hat", "ess"])
+        return pd.DataFrame(rows, columns=["parameter", "r_hat", "ess"])
+
+    def parameters(self, level: float = 0.95) -> pd.DataFrame:
+        """parameter, median, low, high, r_hat, ess; spreads, side, thresholds and worths."""
+        rows = [(name, *_summary(draws, level)) for name, draws in self._named.items()]
+        table = pd.DataFrame(rows, columns=["parameter", "median", "low", "high"])
+        return table.merge(self.trust, on="parameter")
 
     def doubts(self) -> list[str]:
         """Why the draws may not be those of the posterior; empty where nothing says so."""
-        table, found = self.parameters(), []
+        table, found = self.trust, []
         worst, least = table.r_hat.max(), table.ess.min()
         if not worst <= MOST_R_HAT:
             name = table.parameter[table.r_hat.fillna(np.inf).argmax()]
@@ -168,6 +175,7 @@ class Posterior:
         )
         return buffer.getvalue()
 
+    @cached_property
     def _places(self) -> dict[str, np.ndarray]:
         """Name -> worths (all draws, n) there."""
         n = len(self.techniques)
@@ -194,12 +202,11 @@ def sample(
             "the Bayesian model needs the sampler NumPyro, which is not installed; expected "
             "`pip install subdermal[bayes]`, or the packages of requirements-bayes.lock"
         )
-    # as many chains side by side as there are cores; read when jax is first loaded
-    flag = f"--xla_force_host_platform_device_count={min(sampling.chains, os.cpu_count() or 1)}"
-    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {flag}".strip()
     import jax
     import numpyro
 
+    # as many chains side by side as there are cores; read when jax is first used
+    numpyro.set_host_device_count(min(sampling.chains, os.cpu_count() or 1))
     numpyro.enable_x64()
     data = _data(responses)
     several = jax.local_device_count() >= sampling.chains

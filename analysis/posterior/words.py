@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from analysis import figures
 from analysis.codebook import Codebook
 from analysis.figures import BLUE, SIMULATED, Picture
+from analysis.files import csv_bytes
 from analysis.methods import versions
 from analysis.options import OVERALL
 from analysis.posterior.model import NEW_IMAGE, PRIORS, STEPS, Posterior
 from analysis.responses import Responses
+from analysis.worth_figures import rungs
 
 NAMES = {
     "sd_image": "spread of what a technique gains in one image",
@@ -36,17 +37,13 @@ def posterior_files(
     tables |= {"posterior_parameters": parameters}
     page = _page(found, responses, tables, sentences, level, command)
     files = {
-        f"{name}.csv": _csv(table.assign(simulated=int(simulated)))
+        f"{name}.csv": csv_bytes(table.assign(simulated=int(simulated)), 6)
         for name, table in tables.items()
     }
     files |= {"posterior.npz": found.draws(), "posterior.md": page.encode()}
     for picture in draw_posterior(worths, codebook, simulated, level):
         files |= picture.files
     return files, sentences
-
-
-def _csv(table: pd.DataFrame) -> bytes:
-    return table.to_csv(index=False, float_format="%.6g", lineterminator="\n").encode()
 
 
 def place_label(codebook: Codebook, name: str) -> str:
@@ -204,7 +201,6 @@ def _ladders(places: list[str], worths: pd.DataFrame, codebook: Codebook) -> Fig
     order = list(overall.technique)
     for ax, place in zip(panels, places, strict=True):
         here = worths[worths.framing == place].set_index("technique").loc[order]
-        ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
         if place == OVERALL:
             new = worths[worths.framing == NEW_IMAGE].set_index("technique")
             for y, name in enumerate(name for name in order if name in new.index):
@@ -213,12 +209,7 @@ def _ladders(places: list[str], worths: pd.DataFrame, codebook: Codebook) -> Fig
         for y, row in enumerate(here.itertuples()):
             ax.plot([row.low, row.high], [y, y], color=BLUE, linewidth=1.6, zorder=2)
             ax.plot(row.median, y, "o", color=BLUE, markersize=4.5, zorder=3)
-        labels = [figures._cut(codebook.label(name), 22) for name in order]
-        ax.set_yticks(range(len(labels)), labels, size=7.5)
-        ax.set_ylim(len(labels) - 0.5, -0.5)
+        rungs(ax, [codebook.label(name) for name in order])
         ax.set_title(figures._cut(place_label(codebook, place), 34), loc="left")
-        ax.xaxis.set_major_locator(MaxNLocator(7))
-        ax.tick_params(labelbottom=True)
-        ax.grid(axis="x")
     figure.supxlabel("logits, to the right looks more real", size=8)
     return figure

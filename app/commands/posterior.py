@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from app.commands.analyse import names, read_answers, tell, written
+from app.answers import read_answers, study_option, tell, varied_option, written
 
 
 @click.command()
@@ -18,24 +18,8 @@ from app.commands.analyse import names, read_answers, tell, written
     type=click.Path(path_type=Path),
     help="Folder for posterior.md, its tables, the figure and the draws.",
 )
-@click.option(
-    "--study",
-    type=click.Path(path_type=Path),
-    metavar="MANIFEST",
-    help=(
-        "The study's manifest.json, or its folder, for labels and order. Without it the "
-        "manifest.json beside RESPONSES, if any."
-    ),
-)
-@click.option(
-    "--varied",
-    callback=names,
-    metavar="A,B",
-    help=(
-        "Columns that tell images apart beside framing, such as person,light. Without it those "
-        "of the study's manifest."
-    ),
-)
+@study_option
+@varied_option
 @click.option("--chains", default=4, show_default=True, type=int, help="Chains, 2 or more.")
 @click.option("--draws", default=1000, show_default=True, type=int, help="Draws of each chain.")
 @click.option(

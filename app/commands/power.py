@@ -8,12 +8,7 @@ from pathlib import Path
 
 import click
 
-
-def names(
-    ctx: click.Context, parameter: click.Parameter, value: str | None
-) -> tuple[str, ...] | None:
-    """'a, b' as ('a', 'b')."""
-    return None if value is None else tuple(name.strip() for name in value.split(","))
+from app.answers import names
 
 
 def worths(

@@ -8,7 +8,6 @@ export function watch(page) {
   const pair = page.querySelector(".pair");
   const [left, top, right, bottom] = page.dataset.region.split(" ").map(Number);
   const lay = () => pair.isConnected && layOut(pair, { left, top, width: right - left, height: bottom - top });
-  lay();
   new ResizeObserver(lay).observe(pair);
   const ratioChanged = () => {
     if (!pair.isConnected) return;
@@ -55,15 +54,13 @@ function layOut(pair, region) {
 // Resample once, into a canvas that is as many pixels as the screen shows of it: a browser's own scaling of an <img>
 // depends on where it stands.
 function draw(frame, img, from, width, height, css) {
-  let canvas = frame.querySelector("canvas");
-  if (!canvas) {
-    canvas = document.createElement("canvas");
-    canvas.setAttribute("aria-hidden", "true"); // the image beneath has the words
-    frame.append(canvas);
-  }
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  const old = frame.querySelector("canvas"), canvas = old ?? document.createElement("canvas");
   Object.assign(canvas.style, { width: css(width), height: css(height) });
+  if (old && old.width === width && old.height === height) return; // it only moved
+  Object.assign(canvas, { width, height });
+  canvas.setAttribute("aria-hidden", "true"); // the image beneath has the words
   const context = canvas.getContext("2d", { alpha: false });
   context.imageSmoothingQuality = "high";
   context.drawImage(img, ...from, 0, 0, width, height);
+  frame.append(canvas);
 }

@@ -21,7 +21,7 @@ from renderer.parameters import parameter
 from renderer.passes.given import draw_given
 from renderer.passes.surfaces import Drawn
 from renderer.scene.shapes import points_on, triangle_areas
-from renderer.techniques.base import Inputs, Scattered, Technique
+from renderer.techniques.base import Inputs, Room, Scattered, Technique
 from renderer.techniques.drawing import result
 
 MOST_POINTS = 4_000_000
@@ -96,7 +96,7 @@ class PointsTechnique(Technique):
             ):
                 sums.bind(clear=(0.0, 0.0, 0.0, 0.0))
                 for drawn in room.surfaces:
-                    self._splat(inputs, drawn, profile, sums)
+                    self._splat(inputs, room, drawn, profile, sums)
                 target.bind()
                 inputs.programs("techniques/splat_sum.glsl").use(
                     sent=sums.textures[0],
@@ -109,9 +109,10 @@ class PointsTechnique(Technique):
             profile.delete()
         return Scattered(target)
 
-    def _splat(self, inputs: Inputs, drawn: Drawn, profile: gl.Texture, sums: gl.Target) -> None:
+    def _splat(
+        self, inputs: Inputs, room: Room, drawn: Drawn, profile: gl.Texture, sums: gl.Target
+    ) -> None:
         """Add one surface's points to the sums."""
-        room = inputs.needed_room(self.name)
         part = drawn.item.primitive
         areas = triangle_areas(drawn.item.in_world(part.positions), part.faces)
         area = areas.sum()
