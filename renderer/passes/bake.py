@@ -9,13 +9,15 @@ normal and first-order right for a bumped one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 
+from renderer.scene.graph import Item
 from renderer.scene.lights import DistantLight, Light, SpotLight
+from renderer.scene.material import Skin
 
 BOUNCES = 2
 OFFSET_MM = 0.35
@@ -47,7 +49,7 @@ class Baked:
     openness: np.ndarray
 
 
-def _hemisphere(n: int) -> np.ndarray:
+def hemisphere(n: int) -> np.ndarray:
     """n cosine-distributed directions about +z on a Fibonacci spiral: (n, 3)."""
     k = np.arange(n)
     r = np.sqrt((k + 0.5) / n)
@@ -55,7 +57,7 @@ def _hemisphere(n: int) -> np.ndarray:
     return np.column_stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r**2)])
 
 
-def _frames(normals: np.ndarray, spin: np.ndarray) -> np.ndarray:
+def frames(normals: np.ndarray, spin: np.ndarray) -> np.ndarray:
     """Rotations (N, 3, 3) that take +z to each normal, turned about it by `spin` (N,) radians."""
     sign = np.where(
         normals[:, 2] >= 0, 1.0, -1.0
@@ -96,6 +98,21 @@ def _seen(light: Light, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
     return -away, distance, strength
 
 
+def body(item: Item) -> Body:
+    """A surface, or an eye, in the world: as coarse as rays take it (its proxy)."""
+    part = item.primitive
+    if hasattr(part, "proxy"):
+        proxy = part.proxy
+        positions, normals = item.in_world(proxy.positions), item.turned(proxy.normals)
+        albedo, value = proxy.albedo, part.material.value
+        if isinstance(value, Skin) and proxy.masks is not None:
+            albedo = value.mean_albedo(proxy.masks)
+        return Body(positions, normals, proxy.faces, np.asarray(albedo), proxy.smooth)
+    positions, normals = item.in_world(part.positions), item.turned(part.normals)
+    grey = np.full((len(positions), 3), 0.5)
+    return Body(positions, normals, part.faces, grey)
+
+
 class Tracer:
     """The scene as rays see it: triangles, and the radiance that each sends back."""
 
@@ -107,44 +124,71 @@ class Tracer:
         radiance: Callable[[np.ndarray], np.ndarray],
         seed: int,
     ):
-        self._mesh = trimesh.Trimesh(positions, faces, process=False, validate=False)
-        self._rays = _intersector(self._mesh)
+        self.mesh = trimesh.Trimesh(positions, faces, process=False, validate=False)
+        self._rays = _intersector(self.mesh)
         self._lights, self._radiance, self._seed = lights, radiance, seed
+
+    def first(self, origins: np.ndarray, towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The triangle that each ray meets first, -1 for none (N,), and how far, mm (N,)."""
+        triangles = self._rays.intersects_first(origins, towards)
+        hit = np.flatnonzero(triangles >= 0)
+        corner = self.mesh.triangles[triangles[hit], 0]
+        normal = self.mesh.face_normals[triangles[hit]]
+        ahead = np.einsum("ni,ni->n", corner - origins[hit], normal)
+        along = np.einsum("ni,ni->n", towards[hit], normal)
+        distance = np.full(len(origins), np.inf)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance[hit] = ahead / along
+        return triangles, distance
+
+    def blocked(self, origins: np.ndarray, towards: np.ndarray, reach: np.ndarray) -> np.ndarray:
+        """Whether anything is nearer than `reach` (N,) mm along unit directions: (N,)."""
+        _, distance = self.first(origins, towards)
+        return distance < reach - OFFSET_MM
 
     def lamps(self, points: np.ndarray, normals: np.ndarray, rays: int = 6) -> np.ndarray:
         """Irradiance (N, 3) from the lamps, with shadow rays."""
         total = np.zeros((len(points), 3))
         rng = np.random.default_rng([self._seed, 1])
+        for towards, irradiance in self.lit(points, normals, rays, rng):
+            total += np.maximum(np.einsum("ni,ni->n", normals, towards), 0)[:, None] * irradiance
+        return total
+
+    def lit(
+        self,
+        points: np.ndarray,
+        normals: np.ndarray,
+        rays: int,
+        rng: np.random.Generator | None,
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """For each lamp unit directions (N, 3) to it and the irradiance (N, 3) of what faces it.
+
+        rays: shadow rays a point, over the lamp's size; rng None: one, to its middle.
+        """
         for light in self._lights:
             towards, distance, strength = _seen(light, points)
-            cosine = np.maximum(np.einsum("ni,ni->n", normals, towards), 0) * strength
-            facing = np.flatnonzero(cosine > 0)
+            strength = np.where(np.einsum("ni,ni->n", normals, towards) > 0, strength, 0)
+            facing = np.flatnonzero(strength > 0)
             lit = self._unshadowed(light, points, normals, facing, rays, rng, towards, distance)
-            total[facing] += (lit * cosine[facing])[:, None] * np.array(light.irradiance)
-        return total
+            share = np.zeros(len(points))
+            share[facing] = lit * strength[facing]
+            yield towards, share[:, None] * np.array(light.irradiance)
 
     def _unshadowed(self, light, points, normals, facing, rays, rng, towards, distance):
         """The share of shadow rays that reach the lamp (F,)."""
         if not light.shadow:
             return np.ones(len(facing))
+        rays = 1 if rng is None else rays
         origin = np.repeat(points[facing] + OFFSET_MM * normals[facing], rays, axis=0)
-        spread = rng.normal(size=(len(origin), 3)) / 1.5
+        spread = np.zeros((len(origin), 3)) if rng is None else rng.normal(size=(len(origin), 3))
+        spread /= 1.5
         if isinstance(light, DistantLight):
             spread *= np.tan(np.radians(light.radius_deg))
             hit = self._rays.intersects_any(origin, light.towards + spread)
             return 1 - hit.reshape(-1, rays).mean(axis=1)
         aim = light.place + light.radius_mm * spread - origin
         reach = np.linalg.norm(aim, axis=1)
-        aim /= reach[:, None]
-        first = self._rays.intersects_first(origin, aim)
-        hit = first >= 0
-        corner = self._mesh.triangles[first[hit], 0]
-        normal = self._mesh.face_normals[first[hit]]
-        ahead = np.einsum("ni,ni->n", corner - origin[hit], normal)
-        along = np.einsum("ni,ni->n", aim[hit], normal)
-        nearer = np.zeros(len(origin), bool)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            nearer[hit] = ahead / along < reach[hit] - OFFSET_MM
+        nearer = self.blocked(origin, aim / reach[:, None], reach)
         return 1 - nearer.reshape(-1, rays).mean(axis=1)
 
     def gather(
@@ -152,12 +196,12 @@ class Tracer:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Directions (N, rays, 3) and the triangle that each ray meets, -1 for none (N, rays)."""
         spin = np.random.default_rng([self._seed, 2]).uniform(0, 2 * np.pi, len(points))
-        local = _hemisphere(rays)
+        local = hemisphere(rays)
         hits = np.empty((len(points), rays), dtype=np.int32)
         directions = np.empty((len(points), rays, 3), dtype=np.float32)
         for start in range(0, len(points), CHUNK):
             part = slice(start, start + CHUNK)
-            d = np.einsum("nij,rj->nri", _frames(normals[part], spin[part]), local)
+            d = np.einsum("nij,rj->nri", frames(normals[part], spin[part]), local)
             origin = np.repeat(points[part] + OFFSET_MM * normals[part], rays, axis=0)
             hits[part] = self._rays.intersects_first(origin, d.reshape(-1, 3)).reshape(-1, rays)
             directions[part] = d
@@ -220,7 +264,7 @@ def bake(
     lamps = tracer.lamps(points, normals)
     directions, hits = tracer.gather(points, normals, rays)
     # rays that start inside (folded lips, the back of the eyes) meet back faces: those send nothing
-    facing = tracer._mesh.face_normals[np.maximum(hits, 0)].astype(np.float32)
+    facing = tracer.mesh.face_normals[np.maximum(hits, 0)].astype(np.float32)
     away = np.einsum("nri,nri->nr", directions, facing) > 0
     blocked = np.where((hits >= 0) & away, len(faces), hits)
     irradiance = lamps

@@ -8,7 +8,7 @@ import numpy as np
 
 from renderer import gl
 from renderer.scene.lights import Environment
-from renderer.scene.maps import convolve, directions, lookup, read_map, turn
+from renderer.scene.maps import convolve, directions, lookup, read_map, solid_angles, turn
 
 LAYERS = 7  # sharpness 1, 4, 16, ... 4096
 
@@ -38,6 +38,18 @@ class Surroundings:
             k = int(np.clip(round(np.log(max(sharpness, 1)) / np.log(4)), 0, LAYERS - 1))
             found = lookup(self._layers[k], towards @ turn(self.value).T)
             total = total + self.value.scale * found
+        return total
+
+    def mean(self) -> np.ndarray:
+        """Mean radiance (3,) over all directions: the ambient intensity I_a of local models."""
+        total = np.array(self.value.ambient, float)
+        for panel in self.value.panels.values():
+            s = panel.sharpness
+            total += np.array(panel.radiance) * (-np.expm1(-2 * s) / (2 * s) if s > 0 else 1.0)
+        if self._layers:
+            pixels = self._layers[-1]
+            share = solid_angles(pixels.shape[0])[..., None] / (4 * np.pi)
+            total += self.value.scale * (pixels * share).sum(axis=(0, 1))
         return total
 
     def defines(self) -> dict[str, int]:

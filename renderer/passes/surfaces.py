@@ -15,11 +15,11 @@ from renderer import gl
 from renderer.gl import GL
 from renderer.optics import fits, media, surface
 from renderer.optics.curve import Curve
-from renderer.passes.bake import Baked, Body, bake
+from renderer.passes.bake import Baked, bake, body
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
 from renderer.scene.graph import Contents, Item
-from renderer.scene.material import Material, Skin
+from renderer.scene.material import MODELS, Material, Shading, Skin
 from renderer.scene.model import MASKS
 
 _HALF = GL.GL_RGBA16F
@@ -57,7 +57,7 @@ class Surfaces:
         height, width = table.shape[:2]
         self.face = gl.Texture(width, height, GL.GL_RGBA32F, linear=True, data=table)
         items = [*found.surfaces, *found.eyes]
-        bodies = [_body(item) for item in items]
+        bodies = [body(item) for item in items]
         baked = bake(bodies, lights, surroundings.radiance, rays, seed) if bodies else []
         self.media: list[str | dict] = []
         self.surfaces = [
@@ -119,8 +119,11 @@ class Surfaces:
         defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": domain}
         values = {**shared, **lamps.uniforms(), **surroundings.uniforms(), "face_table": self.face}
         own = {**defines, "DIFFUSE": surface.DIFFUSE.index(diffuse)}
-        program = programs("passes/skin.frag", own, vertex="passes/surface.vert")
+        values["mean_radiance"] = surroundings.mean()
         for drawn in self.surfaces if only is None else [only]:
+            local = isinstance(drawn.item.primitive.material.value, Shading)
+            shader = "passes/local.frag" if local else "passes/skin.frag"
+            program = programs(shader, own, vertex="passes/surface.vert")
             program.use(**program.accepts({**values, **self._material(drawn)}))
             (mesh or drawn.mesh).draw()
         if only is not None:
@@ -190,6 +193,7 @@ class Surfaces:
             "gaussian_weight": through.weights,
             "thickness_scale": material.thickness_scale,
             "transmission_wrap": material.transmission_wrap,
+            **(_local(material) if isinstance(material, Shading) else {}),
         }
 
     def points(self, drawn: Drawn, faces: np.ndarray, weights: np.ndarray) -> gl.Mesh:
@@ -206,18 +210,15 @@ class Surfaces:
         return gl.Mesh({where: at(array) for where, array in whole.items()})
 
 
-def _body(item: Item) -> Body:
-    part = item.primitive
-    if hasattr(part, "proxy"):
-        proxy = part.proxy
-        positions, normals = item.in_world(proxy.positions), item.turned(proxy.normals)
-        albedo, value = proxy.albedo, part.material.value
-        if isinstance(value, Skin) and proxy.masks is not None:
-            albedo = value.mean_albedo(proxy.masks)
-        return Body(positions, normals, proxy.faces, np.asarray(albedo), proxy.smooth)
-    positions, normals = item.in_world(part.positions), item.turned(part.normals)
-    grey = np.full((len(positions), 3), 0.5)
-    return Body(positions, normals, part.faces, grey)
+def _local(material: Shading) -> dict:
+    """The uniforms of an illumination model, passes/local.frag."""
+    return {
+        "model_number": MODELS.index(material.model),
+        "k_a": (-1.0,) * 3 if material.k_a is None else material.k_a,
+        "k_s": material.k_s,
+        "exponent": material.exponent,
+        "emission": material.emission,
+    }
 
 
 def _attributes(part, masks, light, openness, scatters) -> dict[int, np.ndarray]:

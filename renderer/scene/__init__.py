@@ -9,7 +9,7 @@ from renderer.scene.lights import (
     PointLight,
     SpotLight,
 )
-from renderer.scene.material import Material, Skin
+from renderer.scene.material import Material, Shading, Skin
 from renderer.scene.model import MASKS, Eye, Model, Proxy, Strands, Surface
 from renderer.scene.picture import Picture
 from renderer.scene.scene import Scene
@@ -30,6 +30,7 @@ __all__ = [
     "PointLight",
     "Proxy",
     "Scene",
+    "Shading",
     "Skin",
     "SpotLight",
     "Strands",

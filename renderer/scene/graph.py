@@ -1,8 +1,9 @@
 """The scene graph: pyrender's scene, meshes and lights, extended by what these passes need.
 
 A `pyrender.Scene` of one's own can be handed to the renderer too: its meshes become opaque
-surfaces with their base colours, its lights lamps without a size, its ambient light a constant
-environment. Lengths are millimetres; a point light's `intensity` is its irradiance at one metre.
+surfaces with their base colours, or those of a SurfaceMaterial where they have one, its lights
+lamps without a size, its ambient light a constant environment. Lengths are millimetres; a point
+light's `intensity` is its irradiance at one metre.
 """
 
 from __future__ import annotations
@@ -226,7 +227,7 @@ def _light(light: pyrender.Light, pose: np.ndarray) -> Light:
 
 
 def _opaque(primitive: pyrender.Primitive) -> SurfacePrimitive:
-    """A plain pyrender primitive as a surface that does not scatter."""
+    """A plain pyrender primitive as a surface."""
     faces = primitive.indices
     if faces is None:
         faces = np.arange(len(primitive.positions)).reshape(-1, 3)
@@ -237,11 +238,7 @@ def _opaque(primitive: pyrender.Primitive) -> SurfacePrimitive:
         from renderer.scene.shapes import vertex_normals
 
         normals = vertex_normals(positions, faces)
-    given = primitive.material
-    factor = getattr(given, "baseColorFactor", np.array([0.5, 0.5, 0.5, 1.0]))
-    roughness = float(getattr(given, "roughnessFactor", 0.5) or 0.0)
-    albedo = tuple(float(v) for v in np.clip(factor[:3], 0, 1))
-    value = Material(medium="", albedo=albedo, roughness=float(np.clip(roughness**2, 0.05, 0.9)))
+    value = _value(primitive.material)
     n = len(positions)
     uvs = primitive.texcoord_0
     skin = Surface(
@@ -250,10 +247,20 @@ def _opaque(primitive: pyrender.Primitive) -> SurfacePrimitive:
         np.zeros((n, 2), np.float32) if uvs is None else uvs[:, :2].astype(np.float32),
         faces,
         np.zeros((n, len(MASKS)), np.float32),
-        Proxy.itself(positions, normals, faces, albedo),
-        scatters=np.zeros(n),
+        Proxy.itself(positions, normals, faces, value.albedo),
+        scatters=None if value.scatters else np.zeros(n),
     )
     return SurfacePrimitive(skin, SurfaceMaterial(value), {})
+
+
+def _value(given: pyrender.Material | None) -> Material:
+    """Our material of a pyrender material: its own, or an opaque one of its base colour."""
+    if isinstance(given, SurfaceMaterial):
+        return given.value
+    factor = getattr(given, "baseColorFactor", np.array([0.5, 0.5, 0.5, 1.0]))
+    roughness = float(getattr(given, "roughnessFactor", 0.5) or 0.0)
+    albedo = tuple(float(v) for v in np.clip(factor[:3], 0, 1))
+    return Material(medium="", albedo=albedo, roughness=float(np.clip(roughness**2, 0.05, 0.9)))
 
 
 def look_at(eye: np.ndarray, target: np.ndarray) -> np.ndarray:

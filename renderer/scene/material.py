@@ -187,7 +187,68 @@ def _smoothstep(low: float, high: float, x: np.ndarray) -> np.ndarray:
     return t * t * (3 - 2 * t)
 
 
-MATERIALS: dict[str, type[Material]] = {kind.kind: kind for kind in (Material, Skin)}
+#: Local illumination models, in the order of their numbers in passes/local.frag.
+MODELS = ("lambert", "phong", "blinn_phong", "cook_torrance")
+
+
+@dataclass(frozen=True)
+class Shading(Material):
+    """An opaque, glossy, mirroring or clear surface by a local illumination model.
+
+    A lamp's irradiance E makes the radiance E / pi (k_d (n . l) + k_s lobe), where k_d is `albedo`
+    and the lobe is (r . v)^exponent (Phong 1975), (n . h)^exponent (Blinn 1977) or none (Lambert);
+    Cook and Torrance's is E k_s F G D / (4 (n . v)), of `roughness` and `f0`. To it come `emission`
+    and, where nothing computes interreflection, k_a times the scene's mean environment radiance.
+    k_r and k_t are the shares of the mirrored and of the refracted ray (Whitted 1980, whose single
+    k_s is both k_s and k_r). Formulas: renderer/illumination/models.py.
+    """
+
+    kind: ClassVar[str] = "shading"
+
+    medium: str | dict = ""
+    albedo: tuple[float, float, float] = parameter((0.6, 0.6, 0.6), source="k_d", **_SHARE)
+    model: str = parameter("blinn_phong", choices=MODELS, source="Blinn 1977 is the usual one")
+    k_a: tuple[float, float, float] | None = parameter(
+        (None, (0.5, 0.5, 0.5)), optional=True, source="the albedo, where it is not given", **_SHARE
+    )
+    k_s: tuple[float, float, float] = parameter(
+        (0.3, 0.3, 0.3), low=0.0, high=10.0, source="usually the same in all channels"
+    )
+    exponent: float = parameter(
+        30.0, unit="of the cosine", low=1.0, high=1e4, source="Phong 1975: 1 to 10 is dull"
+    )
+    emission: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), unit="radiance", low=0.0, high=1e6, source="the scene's"
+    )
+    k_r: tuple[float, float, float] = parameter((0.0, 0.0, 0.0), source="no mirror", **_SHARE)
+    k_t: tuple[float, float, float] = parameter((0.0, 0.0, 0.0), source="not clear", **_SHARE)
+    index: float = parameter(1.5, low=1.0, high=4.0, source="crown glass")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.medium:
+            raise InputError(
+                f"{self.where('medium')} is {self.medium!r:.60}; expected none: light does not "
+                "scatter below an illumination model"
+            )
+        if self.normal_map or self.roughness_map:
+            raise InputError(
+                f"{self.where('normal_map')} and roughness_map are not for kind 'shading'; "
+                "expected albedo_map alone"
+            )
+        most = max(map(sum, zip(self.albedo, self.k_r, self.k_t, strict=True)))
+        if most > 1 + 1e-9:
+            raise InputError(
+                f"{self.where('albedo')} + k_r + k_t is {most:g}; expected at most 1 a channel"
+            )
+
+    @property
+    def ambient(self) -> tuple[float, float, float]:
+        """k_a."""
+        return self.albedo if self.k_a is None else self.k_a
+
+
+MATERIALS: dict[str, type[Material]] = {kind.kind: kind for kind in (Material, Skin, Shading)}
 
 
 def read_material(table: Mapping[str, Any], where: str) -> Material:
