@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from alembic import command
 from alembic.config import Config
 from alembic.util import CommandError
-from sqlalchemy import Engine, create_engine, event, make_url
+from sqlalchemy import Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError, DatabaseError, NoSuchModuleError
 from sqlalchemy.orm import Session
 
@@ -50,7 +50,7 @@ class Database:
                 f"sqlite:////data/study.sqlite3, got {url!r}"
             ) from None
         try:
-            engine = _engine(url)
+            engine = connect(url)
             with engine.connect() as connection:
                 _migrate(connection)
         except (NoSuchModuleError, ModuleNotFoundError) as error:
@@ -100,6 +100,14 @@ class Database:
         with Session(self._writer, expire_on_commit=False) as session, session.begin():
             yield session
 
+    @contextmanager
+    def append(self) -> Iterator[Connection]:
+        """A writer's transaction in plain rows, for what happens with every answer: objects cost as
+        much as the rest of it.
+        """
+        with self._writer.begin() as connection:
+            yield connection
+
     def record(self) -> StudyRecord:
         """The row that says what this database is about, detached."""
         with self.read() as session:
@@ -111,7 +119,8 @@ class Database:
         self._engine.dispose()
 
 
-def _engine(url: str) -> Engine:
+def connect(url: str) -> Engine:
+    """An engine with our settings; a connection with the option `writes` begins as a writer."""
     engine = create_engine(url, pool_pre_ping=not url.startswith("sqlite"))
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", _configure_sqlite)

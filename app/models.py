@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy import (
     BigInteger,
@@ -14,8 +15,17 @@ from sqlalchemy import (
     MetaData,
     String,
     UniqueConstraint,
+    func,
+    select,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+from sqlalchemy.orm import (
+    DeclarativeBase,
+    InstrumentedAttribute,
+    Mapped,
+    column_property,
+    mapped_column,
+    relationship,
+)
 from sqlalchemy.types import TypeDecorator
 
 
@@ -158,9 +168,21 @@ class Response(Base):
     trial: Mapped[Trial] = relationship(back_populates="response")
 
 
+def _count(column: InstrumentedAttribute) -> Any:
+    """How many rows of another table are a participant's; loaded where it is asked for."""
+    rows = select(func.count()).where(column == Participant.id)
+    return column_property(rows.correlate_except(column.class_).scalar_subquery(), deferred=True)
+
+
+#: As of when the participant was loaded. Answers are given in the questions' order: the next
+#: question is the one after the last answer.
+Participant.answered = _count(Response.participant_id)
+Participant.questions = _count(Trial.participant_id)
+
+
 class Event(Base):
-    """What happened to a participant and when: consented, rated, shown, refused, completed,
-    withdrew.
+    """What happened to a participant and when: consented, rated, refused, completed, withdrew
+    (and shown, in databases of before 2026-11).
     """
 
     __tablename__ = "events"

@@ -1,5 +1,6 @@
 """`subdermal serve`: the questionnaire and the dashboard of a study folder."""
 
+import os
 from pathlib import Path
 
 import click
@@ -19,6 +20,13 @@ import click
     show_default=True,
     type=click.IntRange(0, 65535),
     help="Port to listen on; 0 takes a free one.",
+)
+@click.option(
+    "--workers",
+    default=os.cpu_count() or 1,
+    show_default="the number of cores",
+    type=click.IntRange(1, 64),
+    help="Processes that answer; each needs about 100 MB of memory of its own.",
 )
 @click.option(
     "--database",
@@ -42,6 +50,7 @@ def command(
     directory: Path,
     host: str,
     port: int,
+    workers: int,
     database: str | None,
     reset_password: bool,
     trusted_proxy: str | None,
@@ -54,9 +63,8 @@ def command(
     """
     from werkzeug.middleware.dispatcher import DispatcherMiddleware
 
-    from app import create_app
+    from app import create_app, server
     from app.dashboard import password
-    from app.server import bind, port_of
 
     app = create_app(directory, database)
     study, answers = app.extensions["study"], app.extensions["database"]
@@ -70,7 +78,7 @@ def command(
             "trusted_proxy": trusted_proxy,
             "trusted_proxy_headers": {"x-forwarded-for", "x-forwarded-proto", "x-forwarded-host"},
         }
-    server = bind(application, host, port, **proxy)
+    sockets = server.listen(host, port)
     shown = (
         password.reset(answers)
         if reset_password or answers.record().password_hash is None
@@ -81,7 +89,9 @@ def command(
             answers.record().password_hash
         )  # one password opens both dashboards
 
-    address = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{port_of(server)}"
+    address = (
+        f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{server.port_of(sockets)}"
+    )
     click.echo(f"questionnaire  {address}/")
     click.echo(f"dashboard      {address}/dashboard/")
     if shown:
@@ -93,4 +103,6 @@ def command(
         if study.report(True).is_file():
             click.echo(f"               {address}/simulated/dashboard/report/")
     click.echo("Ctrl+C ends the server; every answer that was acknowledged is saved.")
-    server.run()
+    for one in (app, twin) if simulated else (app,):
+        one.extensions["database"].close()  # each worker opens its own connections
+    server.run(application, sockets, workers, **proxy)

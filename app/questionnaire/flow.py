@@ -1,6 +1,6 @@
 """What happens to a participant, without the web: enrol, rate, show, answer, complete, withdraw.
 
-The server owns the position: the current trial is the first one without an answer. Every function
+The server owns the position: the current trial is the one after the last answer. Every function
 takes the session of a write transaction (`Database.write`), which is on the disk when its block
 ends.
 """
@@ -8,13 +8,16 @@ ends.
 from __future__ import annotations
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from enum import Enum
 
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import Connection, Row, bindparam, insert, select
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session, undefer
 
 from app.assignment import assign
+from app.database import Database
 from app.models import Event, Participant, Response, Trial, now, plain_code
 from app.study import Study
 
@@ -50,13 +53,21 @@ class Answer:
 
 
 def find(session: Session, visit: str | None, *, lock: bool = False) -> Participant | None:
-    """The participant of a visit; None before consent.
+    """The participant of a visit, with how many questions are answered; None before consent.
 
     lock: wait until no other transaction holds this participant, so that two clicks come one after
     the other (SQLite has one writer anyway).
     """
-    query = select(Participant).where(Participant.visit == visit)
-    return session.scalar(query.with_for_update() if lock else query) if visit else None
+    return session.scalar(_FIND_AND_LOCK if lock else _FIND, {"visit": visit}) if visit else None
+
+
+# Statements of every answer are built once: building one costs as much as running it.
+_FIND = (
+    select(Participant)
+    .where(Participant.visit == bindparam("visit"))
+    .options(undefer(Participant.answered), undefer(Participant.questions))
+)
+_FIND_AND_LOCK = _FIND.with_for_update()
 
 
 def enrol(session: Session, study: Study, visit: str) -> Participant:
@@ -80,86 +91,158 @@ def rate(session: Session, participant: Participant, familiarity: int) -> None:
         _note(session, participant, "rated")
 
 
-def current(session: Session, participant: Participant) -> Trial | None:
-    """The first trial without an answer; None when all are answered."""
-    query = (
-        select(Trial)
-        .outerjoin(Response)
-        .where(Trial.participant_id == participant.id, Response.id.is_(None))
-    )
-    return session.scalar(query.order_by(Trial.order).limit(1))
+def upcoming(session: Session, participant: Participant, count: int) -> list[Row]:
+    """The next trials (id, order, cell, left, right), at most `count`: the current one first, then
+    those whose images are worth fetching beforehand. Empty when all are answered.
+    """
+    asked = {
+        "participant": participant.id,
+        "first": participant.answered + 1,
+        "last": participant.answered + count,
+    }
+    return list(session.execute(_UPCOMING, asked))
 
 
-def following(session: Session, trial: Trial) -> Trial | None:
-    """The trial after one, whose images are worth fetching beforehand."""
-    return session.scalar(
-        select(Trial).filter_by(participant_id=trial.participant_id, order=trial.order + 1)
-    )
+_UPCOMING = (
+    select(Trial.id, Trial.order, Trial.cell, Trial.left, Trial.right)
+    .where(Trial.participant_id == bindparam("participant"))
+    .where(Trial.order.between(bindparam("first"), bindparam("last")))
+    .order_by(Trial.order)
+)
 
 
-def count_answers(session: Session, participant: Participant) -> int:
-    """How many of a participant's answers are committed."""
-    return session.scalar(select(func.count()).where(Response.participant_id == participant.id))
+@dataclass(frozen=True)
+class Standing:
+    """How far a participant is: what says which page is due."""
+
+    familiarity: int | None
+    withdrawn_at: datetime | None
+    answered: int
+    questions: int
 
 
-def show(session: Session, trial: Trial) -> None:
-    """Note that a question was served: the first time is the trial's start."""
-    session.add(Event(participant_id=trial.participant_id, trial_id=trial.id, kind="shown"))
+@dataclass(frozen=True)
+class Shown:
+    """When a question was first sent to a browser, and how often; the browser's cookie keeps it,
+    signed, so that looking at a question writes nothing.
+    """
+
+    trial_id: int
+    at: datetime
+    times: int
+
+    @classmethod
+    def again(cls, before: Shown | None, trial: Row) -> Shown:
+        """The same after the trial was sent once more."""
+        if before is None or before.trial_id != trial.id:
+            return cls(trial.id, now(), 1)
+        return replace(before, times=before.times + 1)
+
+    @classmethod
+    def of_cookie(cls, kept: object) -> Shown | None:
+        """What `cookie` gave; None for anything else."""
+        match kept:
+            case [int(trial_id), int(at_ms), int(times)]:
+                return cls(trial_id, datetime.fromtimestamp(at_ms / 1000, UTC), times)
+        return None
+
+    def cookie(self) -> list[int]:
+        return [self.trial_id, round(self.at.timestamp() * 1000), self.times]
 
 
 def answer(
-    session: Session, study: Study, participant: Participant, trial_id: int, given: Answer
-) -> Outcome:
-    """Append an answer to the current trial; anything else changes nothing."""
-    trial = session.get(Trial, trial_id)
-    if trial is None or trial.participant_id != participant.id or participant.withdrawn_at:
-        return Outcome.STALE
-    if trial.response:
-        if trial.response.answer == given.value:
-            return Outcome.REPEATED
-        _note(
-            session,
-            participant,
-            "refused",
-            trial,
-            f"kept {trial.response.answer}, refused {given.value}",
-        )
-        return Outcome.REFUSED
-    shown = session.execute(
-        select(func.min(Event.at), func.count()).where(
-            Event.trial_id == trial.id, Event.kind == "shown"
-        )
-    ).one()
+    database: Database, study: Study, visit: str, trial_id: int, given: Answer, shown: Shown | None
+) -> tuple[Outcome, Standing] | None:
+    """Commit an answer to the current trial; anything else changes nothing. Gives how far the
+    participant is then; None where the visit has not begun.
+
+    shown: what this browser's cookie says. The hashes of the images prove that the question was
+    shown; a browser that lost its cookie meanwhile has no time but its own.
+    """
+    try:
+        with database.append() as connection:
+            return _answer(connection, study, visit, trial_id, given, shown)
+    except IntegrityError:
+        # the same click a moment earlier: it has an answer now
+        with database.append() as connection:
+            return _answer(connection, study, visit, trial_id, given, shown)
+
+
+def _answer(
+    connection: Connection,
+    study: Study,
+    visit: str,
+    trial_id: int,
+    given: Answer,
+    shown: Shown | None,
+) -> tuple[Outcome, Standing] | None:
+    asked = connection.execute(_ASKED, {"trial": trial_id, "visit": visit}).one_or_none()
+    if asked is None:
+        return None
+    here = Standing(asked.familiarity, asked.withdrawn_at, asked.answered, asked.questions)
+    if asked.order is None or asked.withdrawn_at:
+        return Outcome.STALE, here
+    if asked.answer is not None:
+        if asked.answer == given.value:
+            return Outcome.REPEATED, here
+        refused = {
+            "participant_id": asked.id,
+            "trial_id": trial_id,
+            "kind": "refused",
+            "detail": f"kept {asked.answer}, refused {given.value}",
+        }
+        if not connection.scalar(select(Event.id).filter_by(**refused).limit(1)):
+            # once: what is repeated without end is not stored without end
+            connection.execute(insert(Event.__table__), refused | {"at": now()})
+        return Outcome.REFUSED, here
     images = (
-        study.image(trial.cell, trial.left).sha256,
-        study.image(trial.cell, trial.right).sha256,
+        study.image(asked.cell, asked.left).sha256,
+        study.image(asked.cell, asked.right).sha256,
     )
     if (
-        trial is not current(session, participant)
-        or not shown.count
-        or participant.familiarity is None
+        asked.order != asked.answered + 1
+        or asked.familiarity is None
+        or images != (given.image_left_sha256, given.image_right_sha256)
     ):
-        return Outcome.STALE
-    if images != (given.image_left_sha256, given.image_right_sha256):
-        return Outcome.STALE
+        return Outcome.STALE, here
     answered_at = now()
-    by_server = max(0, round((answered_at - shown[0]).total_seconds() * 1000))
-    session.add(
-        Response(
-            participant_id=participant.id,
-            trial_id=trial.id,
-            answer=given.value,
-            rt_ms=by_server if given.rt_ms is None else given.rt_ms,
-            timed_by="server" if given.rt_ms is None else "browser",
-            times_shown=shown[1],
-            started_at=shown[0],
-            answered_at=answered_at,
-            **{name: getattr(given, name) for name in _RECORDED},
-        )
+    if shown is None or shown.trial_id != trial_id or shown.at > answered_at:
+        began = answered_at - timedelta(milliseconds=given.rt_ms or 0)
+        shown = Shown(trial_id, max(began, asked.consented_at), 1)
+    by_server = round((answered_at - shown.at).total_seconds() * 1000)
+    row = {
+        "participant_id": asked.id,
+        "trial_id": trial_id,
+        "answer": given.value,
+        "rt_ms": by_server if given.rt_ms is None else given.rt_ms,
+        "timed_by": "server" if given.rt_ms is None else "browser",
+        "times_shown": shown.times,
+        "started_at": shown.at,
+        "answered_at": answered_at,
+    }
+    connection.execute(_APPEND, row | {name: getattr(given, name) for name in _RECORDED})
+    return Outcome.RECORDED, replace(here, answered=here.answered + 1)
+
+
+_ASKED = (
+    select(
+        Participant.id,
+        Participant.familiarity,
+        Participant.withdrawn_at,
+        Participant.consented_at,
+        Participant.answered.expression.label("answered"),
+        Participant.questions.expression.label("questions"),
+        Trial.order,
+        Trial.cell,
+        Trial.left,
+        Trial.right,
+        Response.answer,
     )
-    return Outcome.RECORDED
-
-
+    .outerjoin(Trial, (Trial.participant_id == Participant.id) & (Trial.id == bindparam("trial")))
+    .outerjoin(Response, Response.trial_id == Trial.id)
+    .where(Participant.visit == bindparam("visit"))
+)
+_APPEND = insert(Response.__table__)
 _RECORDED = tuple(name for name in Answer.__dataclass_fields__ if name not in ("value", "rt_ms"))
 
 
@@ -172,8 +255,7 @@ def complete(session: Session, participant: Participant) -> bool:
     """
     if participant.completion_code:
         return True
-    asked = session.scalar(select(func.count()).where(Trial.participant_id == participant.id))
-    if not asked or asked != count_answers(session, participant) or participant.withdrawn_at:
+    if participant.answered != participant.questions or participant.withdrawn_at:
         return False
     participant.completion_code, participant.withdrawal_key = _secret(), _secret()
     participant.completed_at = now()
@@ -204,13 +286,5 @@ def find_by_key(session: Session, key: str) -> Participant | None:
     return session.scalar(asked) if plain else None
 
 
-def _note(
-    session: Session,
-    participant: Participant,
-    kind: str,
-    trial: Trial | None = None,
-    detail: str | None = None,
-) -> None:
-    session.add(
-        Event(participant_id=participant.id, trial_id=trial and trial.id, kind=kind, detail=detail)
-    )
+def _note(session: Session, participant: Participant, kind: str) -> None:
+    session.add(Event(participant_id=participant.id, kind=kind))

@@ -18,11 +18,12 @@ from flask import (
     session,
     url_for,
 )
+from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
-from app.models import Participant, Trial
+from app.models import Participant
 from app.questionnaire import flow
-from app.questionnaire.flow import Answer, Outcome
+from app.questionnaire.flow import Answer, Outcome, Standing
 from app.security import Limiter
 from app.web import database, simulated, study, wants_json
 
@@ -31,6 +32,8 @@ _code_attempts = Limiter(attempts=10, window_s=300)
 
 _LARGEST_RT_MS = 2**31 - 1
 _LARGEST_SIZE = 100_000
+#: How many questions ahead the page fetches images.
+PRELOADED_QUESTIONS = 1
 
 
 @blueprint.get("/")
@@ -45,10 +48,10 @@ def welcome():
                 session["visit"] = secrets.token_urlsafe(16)
                 session.permanent = True
             return render_template("questionnaire/consent.html", paragraphs=study().consent)
-        place = _place(db, participant)
+        place = _place(participant)
         if place in ("questionnaire.thanks", "questionnaire.withdrawn"):
             return redirect(url_for(place))
-        return render_template("questionnaire/back.html", place=place, **_progress(db, participant))
+        return render_template("questionnaire/back.html", place=place, participant=participant)
 
 
 @blueprint.post("/")
@@ -62,15 +65,15 @@ def consent():
         return redirect(url_for(".welcome"), 303)
     with database().write() as db:
         participant = flow.enrol(db, study(), session["visit"])
-        place = _place(db, participant)
+        place = _place(participant)
     return redirect(url_for(place), 303)
 
 
 @blueprint.get("/familiarity")
 def familiarity():
     with database().read() as db:
-        participant = _participant(db, lock=True)
-        if redirection := _redirect_to_due(db, participant):
+        participant = _participant(db)
+        if redirection := _redirect_to_due(participant):
             return redirection
         return render_template("questionnaire/familiarity.html", participant=participant)
 
@@ -86,27 +89,27 @@ def rate():
         participant = _participant(db, lock=True)
         if participant:
             flow.rate(db, participant, value)
-        place = _place(db, participant)
+        place = _place(participant)
     return redirect(url_for(place), 303)
 
 
 @blueprint.get("/question")
 def question():
-    with database().write() as db:
-        participant = _participant(db, lock=True)
-        if redirection := _redirect_to_due(db, participant):
+    with database().read() as db:
+        participant = _participant(db)
+        if redirection := _redirect_to_due(participant):
             return redirection
-        trial = flow.current(db, participant)
-        flow.show(db, trial)
-        return render_template(
-            "questionnaire/question.html",
-            participant=participant,
-            trial=trial,
-            cell=study().cells.index(trial.cell),
-            images=_images(trial),
-            upcoming=_images(flow.following(db, trial)),
-            **_progress(db, participant),
-        )
+        trial, *following = flow.upcoming(db, participant, 1 + PRELOADED_QUESTIONS)
+    shown = flow.Shown.again(flow.Shown.of_cookie(session.get("shown")), trial)
+    session["shown"] = shown.cookie()
+    return render_template(
+        "questionnaire/question.html",
+        participant=participant,
+        trial=trial,
+        cell=study().cells.index(trial.cell),
+        images=_images(trial),
+        upcoming=[image for one in following for image in _images(one)],
+    )
 
 
 @blueprint.post("/question")
@@ -130,17 +133,16 @@ def answer():
         shown_width=_number("shown_width", _LARGEST_SIZE),
         shown_height=_number("shown_height", _LARGEST_SIZE),
     )
-    with database().write() as db:
-        participant = _participant(db, lock=True)
-        if participant is None:
-            abort(400, "This browser has not begun the questionnaire.")
-        outcome = flow.answer(db, study(), participant, trial, given)
-    with (
-        database().write() as db
-    ):  # the answer is on the disk: now the committed answers can be counted
-        participant = _participant(db, lock=True)
-        flow.complete(db, participant)
-        place = _place(db, participant)
+    shown = flow.Shown.of_cookie(session.get("shown"))
+    said = flow.answer(database(), study(), session.get("visit", ""), trial, given, shown)
+    if said is None:
+        abort(400, "This browser has not begun the questionnaire.")
+    outcome, here = said
+    if here.answered == here.questions:
+        # the answers are on the disk: now the committed ones can be counted
+        with database().write() as db:
+            flow.complete(db, _participant(db, lock=True))
+    place = _place(here)
     kept = outcome in (Outcome.RECORDED, Outcome.REPEATED)
     if wants_json():
         return jsonify(outcome=outcome.value, next=url_for(place)), 200 if kept else 409
@@ -153,17 +155,16 @@ def answer():
 
 @blueprint.get("/thanks")
 def thanks():
-    with database().write() as db:
-        participant = _participant(db, lock=True)
-        if participant:
-            flow.complete(
-                db, participant
-            )  # where the server stopped between the last answer and the count
-        if redirection := _redirect_to_due(db, participant):
+    with database().read() as db:
+        participant = _participant(db)
+        if redirection := _redirect_to_due(participant):
             return redirection
-        return render_template(
-            "questionnaire/thanks.html", participant=participant, **_progress(db, participant)
-        )
+    if participant.completion_code is None:
+        # the server stopped between the last answer and the count
+        with database().write() as db:
+            participant = _participant(db, lock=True)
+            flow.complete(db, participant)
+    return render_template("questionnaire/thanks.html", participant=participant)
 
 
 @blueprint.get("/withdraw")
@@ -187,7 +188,7 @@ def withdraw_now():
             if own is not None and own.id != participant.id:  # whose browser this is goes on
                 flow.withdraw(db, participant)
                 flash("The answers that belong to this key were withdrawn. Yours go on.")
-                return redirect(url_for(_place(db, own)), 303)
+                return redirect(url_for(_place(own)), 303)
             session["visit"] = participant.visit
         elif (participant := _participant(db, lock=True)) is None:
             return redirect(url_for(".withdraw"), 303)
@@ -198,9 +199,7 @@ def withdraw_now():
 @blueprint.get("/withdrawn")
 def withdrawn():
     with database().read() as db:
-        return _redirect_to_due(db, _participant(db)) or render_template(
-            "questionnaire/withdrawn.html"
-        )
+        return _redirect_to_due(_participant(db)) or render_template("questionnaire/withdrawn.html")
 
 
 @blueprint.post("/another")
@@ -214,30 +213,26 @@ def _participant(db: Session, *, lock: bool = False) -> Participant | None:
     return flow.find(db, session.get("visit"), lock=lock)
 
 
-def _place(db: Session, participant: Participant | None) -> str:
+def _place(here: Participant | Standing | None) -> str:
     """The page that is due."""
-    if participant is None:
+    if here is None:
         return "questionnaire.welcome"
-    if participant.withdrawn_at:
+    if here.withdrawn_at:
         return "questionnaire.withdrawn"
-    if participant.familiarity is None:
+    if here.familiarity is None:
         return "questionnaire.familiarity"
-    return "questionnaire.question" if flow.current(db, participant) else "questionnaire.thanks"
+    return "questionnaire.question" if here.answered < here.questions else "questionnaire.thanks"
 
 
-def _redirect_to_due(db: Session, participant: Participant | None):
+def _redirect_to_due(participant: Participant | None):
     """A redirect to the page that is due, unless it is the one asked for."""
-    place = _place(db, participant)
+    place = _place(participant)
     return None if place == request.endpoint else redirect(url_for(place), 303)
 
 
-def _progress(db: Session, participant: Participant) -> dict[str, int]:
-    return {"answered": flow.count_answers(db, participant), "questions": len(participant.trials)}
-
-
-def _images(trial: Trial | None):
-    """The left and right image of a trial; nothing after the last one."""
-    return [study().image(trial.cell, side) for side in (trial.left, trial.right)] if trial else []
+def _images(trial: Row):
+    """The left and right image of a trial."""
+    return [study().image(trial.cell, side) for side in (trial.left, trial.right)]
 
 
 def _integer(name: str, low: int, high: int) -> int | None:

@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from sqlalchemy import select
+from sqlalchemy.event import listen
 
 from app.models import Event, Participant, Trial
 from stimuli.design import trials
@@ -102,6 +103,33 @@ def test_reload_resumes_where_it_was(person):
     assert "3 of 30 questions are answered" in somebody.page.text
 
 
+def test_looking_writes_nothing_and_an_answer_is_one_commit(app, person):
+    somebody = person().begin()
+    writes = []
+    database = app.extensions["database"]
+    listen(database._engine, "commit", lambda connection: writes.append(_writes(connection)))
+    for path in ("/", "/question", "/question", "/withdraw", "/familiarity", "/thanks"):
+        somebody.get(path)
+    assert sum(writes) == 0
+    for page in (somebody.form("trial") | {"answer": "1"},) * 2:
+        somebody.http.post("/question", data=page, headers={"Accept": "application/json"})
+    assert sum(writes) == 2 and somebody.answers == [1]  # the second found the first
+
+
+def _writes(connection) -> bool:
+    return connection.get_execution_options().get("writes", False)
+
+
+def test_a_browser_that_lost_when_a_question_was_shown_can_still_answer(person):
+    somebody = person().begin()
+    with somebody.http.session_transaction() as session:
+        del session["shown"]
+    somebody.send("trial", answer=2, rt_ms=3000)
+    [row] = somebody.rows
+    assert (row.answer, row.rt_ms, row.times_shown) == (2, 3000, 1)
+    assert row.started_at <= row.answered_at
+
+
 @pytest.mark.parametrize("path", ["/question", "/familiarity", "/thanks", "/withdrawn"])
 def test_every_address_leads_to_the_page_that_is_due(person, path):
     newcomer = person()
@@ -130,10 +158,11 @@ def test_going_back_cannot_change_an_answer(app, person):
         "/question", data=first | {"answer": "-2"}, follow_redirects=True
     )
     assert somebody.answers == [2] and "the first answer was kept" in somebody.page.text
-    reply = somebody.http.post(
-        "/question", data=first | {"answer": "-1"}, headers={"Accept": "application/json"}
-    )
-    assert (reply.status_code, reply.json["outcome"]) == (409, "refused")
+    for _ in range(3):  # what is repeated without end is stored once
+        reply = somebody.http.post(
+            "/question", data=first | {"answer": "-1"}, headers={"Accept": "application/json"}
+        )
+        assert (reply.status_code, reply.json["outcome"]) == (409, "refused")
     with app.extensions["database"].read() as db:
         details = db.scalars(
             select(Event.detail).where(Event.kind == "refused").order_by(Event.id)

@@ -294,7 +294,7 @@ def test_a_failure_is_a_friendly_page_without_details(app, person, monkeypatch):
     def fail(*_):
         raise RuntimeError("secret detail")
 
-    monkeypatch.setattr("app.questionnaire.flow.current", fail)
+    monkeypatch.setattr("app.questionnaire.flow.upcoming", fail)
     page = somebody.get("/question")
     assert (
         page.status_code == 500

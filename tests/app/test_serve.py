@@ -2,11 +2,16 @@
 killed.
 """
 
+import os
 import re
+import resource
 import signal
 import socket
 import subprocess
 import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
 
 import httpx
 import pytest
@@ -98,6 +103,54 @@ def test_killed_between_an_answer_and_the_next_page_nothing_is_lost(study_dir, s
             headers={"Accept": "application/json"},
         )
         assert repeated.json()["outcome"] == "repeated"
+
+
+def test_a_thousand_idle_and_a_hundred_slow_visitors_stop_nobody(study_dir, serve):
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, most), most))
+    server = serve(study_dir, "--workers", 2)
+    address = "127.0.0.1", int(server.url.split(":")[-1].strip("/"))
+    head = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+    begun = [b""] * 1000 + [head] * 50 + [head + b"Content-Length: 9000\r\n\r\nconsent="] * 50
+    with ExitStack() as opened:
+        for sent in begun:
+            opened.enter_context(socket.create_connection(address)).sendall(sent)
+        with httpx.Client(follow_redirects=True, timeout=20) as http:
+            page = http.get(server.url)
+            page = http.post(server.url, data={"csrf_token": token(page), "consent": "yes"})
+            assert page.url.path == "/familiarity"
+            # far more than a page of ours sends is refused before it is read
+            large = http.post(server.url, content=b"x" * 400_000)
+            assert large.status_code == 413
+
+
+def test_a_worker_that_is_killed_is_replaced_and_none_outlives_the_server(study_dir, serve):
+    server = serve(study_dir, "--workers", 2)
+
+    def workers():
+        main = server.process.pid
+        return set(Path(f"/proc/{main}/task/{main}/children").read_text().split())
+
+    while len(before := workers()) < 2:  # the address is printed before they begin
+        time.sleep(0.02)
+    os.kill(int(min(before)), signal.SIGKILL)
+    while len(now := workers()) < 2 or now == before:
+        time.sleep(0.02)
+    assert httpx.get(server.url).status_code == 200
+    server.kill()
+    with pytest.raises(httpx.ConnectError):
+        for _ in range(500):
+            httpx.get(server.url, timeout=20)
+            time.sleep(0.02)
+
+
+def test_told_to_end_it_ends_its_workers(study_dir, serve):
+    server = serve(study_dir, "--workers", 2)
+    assert httpx.get(server.url).status_code == 200
+    server.process.send_signal(signal.SIGTERM)
+    assert server.process.wait(timeout=20) == 0
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(server.url)
 
 
 def test_the_password_is_shown_once_and_opens_both_dashboards(study_dir, serve):
