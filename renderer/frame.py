@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Self
 
 import numpy as np
@@ -13,11 +13,13 @@ import pyrender
 from renderer import VERSION, gl
 from renderer.errors import InputError
 from renderer.gl import GL
+from renderer.memory import give_back
 from renderer.passes.composite import composite
 from renderer.passes.environment import Surroundings
 from renderer.passes.given import draw_given
 from renderer.passes.hair import Hair
 from renderer.passes.lamps import Lamps
+from renderer.passes.pieces import Piece, pieces
 from renderer.passes.surfaces import FORMATS, PLACED_FORMATS, Drawn, Surfaces
 from renderer.scene import graph as graphs
 from renderer.scene.camera import Camera
@@ -27,6 +29,8 @@ from renderer.techniques.base import Inputs, Room, Technique
 from renderer.techniques.drawing import RESULT_FORMATS
 
 SHADOW_MAP = 4096
+#: Of a reach: half a pixel for each of a technique's passes, and one of a derivative.
+ROUNDING_PX = 8
 SIZE_LIMIT = 8192  # pixels of a side after supersampling
 
 
@@ -81,6 +85,7 @@ class Renderer:
         if not found.surfaces:
             raise InputError("the scene has no surface; expected at least one mesh")
         self.scene, self.size, self.supersample, self.seed = scene, size, supersample, seed
+        give_back()  # what the making of the scene has freed
         self.context = gl.Context()
         try:
             self._programs: dict = {}
@@ -95,6 +100,7 @@ class Renderer:
         except BaseException:
             self.close()
             raise
+        give_back()
         subject = getattr(scene, "subject", None)
         middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
         self.subject = middle if subject is None else np.asarray(subject, float)
@@ -195,15 +201,16 @@ class Renderer:
 class Frame:
     """The shared buffers of one view; use it as a context manager, or close() it.
 
-    surface.textures: irradiance (alpha: the medium's id), specular, albedo (alpha: what gets out
-    through the face), view depth, transmitted light; all at the image's size times supersample.
+    surface.textures: irradiance (alpha: the medium's id), specular light under hair (alpha: what
+    hair hides), albedo (alpha: what gets out through the face), view depth, transmitted light; all
+    at the image's size times supersample.
     """
 
     def __init__(self, renderer: Renderer, view: View, picture: Picture):
         self.renderer, self.view, self.picture = renderer, view, picture
         s = renderer.supersample
         self.width, self.height = renderer.size[0] * s, renderer.size[1] * s
-        self._given: dict[tuple[int, bool, float, str], gl.Target] = {}
+        self.whole = Piece(0, self.height, 0, self.height)
         self._shaded: dict[str, gl.Target] = {}
         self._shared = {
             "camera_position": view.eye,
@@ -213,6 +220,8 @@ class Frame:
         self._draw_surfaces()
         self._draw_hair()
         gl.finish()
+        gl.draw_nothing()
+        give_back()
 
     def __enter__(self) -> Self:
         return self
@@ -229,12 +238,12 @@ class Frame:
         depth = r.program("passes/depth.frag", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert")
         r.surfaces.draw_depth(depth, self._shared)
         GL.glColorMask(True, True, True, True)
+        GL.glColorMaski(1, True, True, True, False)  # the alpha of specular light is hair's
         r.surfaces.draw(r.program, r.lamps, r.surroundings, self._shared)
 
     def _draw_hair(self) -> None:
         r = self.renderer
-        self.hair = gl.Target(self.width, self.height, [GL.GL_RGBA16F], depth=self.surface)
-        self.hair.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True, blend="over")
+        self.surface.bind(depth_test=True, blend="over", only=1)
         for hair in r.hair:
             hair.draw(r.program, r.lamps, r.surroundings, self._shared, self.view.pixels_per_mm)
 
@@ -257,23 +266,40 @@ class Frame:
         medium: int = 1,
         texturing: float = 0.0,
         diffuse: str = "lambert",
+        piece: Piece | None = None,
     ) -> gl.Texture:
         """The input of the techniques: irradiance, alpha 1 where this medium scatters.
 
         translucent: with the transmitted light of Jimenez 2010 added; texturing: times the albedo
         to this power, which the composite then leaves out; diffuse: how light passes the face.
         """
+        r, piece = self.renderer, piece or self.whole
         below = self._irradiance(diffuse)
-        if not translucent and not texturing and len(self.renderer.media) <= 1:
+        own = len(r.media) <= 1 and not translucent and not texturing
+        if own and piece == self.whole:
             return below
-        key = (medium, translucent, texturing, diffuse)
-        if key not in self._given:
-            target = gl.Target(self.width, self.height, [GL.GL_RGBA32F])
-            r, (_, _, albedo, _, transmitted) = self.renderer, self.surface.textures
-            light = (below, transmitted, albedo, medium, translucent, texturing)
-            draw_given(r.context, r.program, target, *light)
-            self._given[key] = target
-        return self._given[key].textures[0]
+        given = gl.Target(self.width, piece.rows, [GL.GL_RGBA32F])
+        _, _, albedo, _, transmitted = self.surface.textures
+        light = (below, transmitted, albedo, medium, translucent, texturing)
+        draw_given(r.context, r.program, given, *light, piece.first)
+        return given.textures[0]
+
+    def _depths(self, piece: Piece) -> gl.Texture:
+        """View depth of a piece's pixels."""
+        whole = self.surface.textures[3]
+        if piece == self.whole:
+            return whole
+        copy = gl.Target(self.width, piece.rows, [whole.internal])
+        copy.bind()
+        self.renderer.program("passes/copy.frag").use(source=whole, first_row=piece.first)
+        gl.draw_fullscreen(self.renderer.context)
+        return copy.textures[0]
+
+    @cached_property
+    def nearest_mm(self) -> float:
+        """View depth of the nearest surface that is seen."""
+        depths = self.surface.textures[3].read()
+        return float(depths.min(where=depths > 0, initial=np.inf))
 
     def inputs(
         self,
@@ -283,16 +309,17 @@ class Frame:
         medium: int = 1,
         texturing: float = 0.0,
         diffuse: str = "lambert",
+        piece: Piece | None = None,
     ) -> Inputs:
         """What a technique gets; the textures can be replaced (tests use a flat patch)."""
-        r = self.renderer
+        r, piece = self.renderer, piece or self.whole
         return Inputs(
             r.context,
             r.program,
-            irradiance or self.irradiance(translucent, medium, texturing, diffuse),
-            depths or self.surface.textures[3],
+            irradiance or self.irradiance(translucent, medium, texturing, diffuse, piece),
+            depths or self._depths(piece),
             self.width,
-            self.height,
+            piece.rows,
             self.view.pixels_per_mm,
             r.supersample,
             r.surfaces.curve(medium),
@@ -304,84 +331,115 @@ class Frame:
                 self._shared,
                 self.surface,
             ),
+            piece.first,
+            self.height,
         )
 
-    def scatter(self, technique: Technique) -> gl.Target:
+    def pieces(self, technique: Technique) -> list[Piece]:
+        """The pieces in which a technique's picture is drawn."""
+        r, reach_px = self.renderer, None
+        media = range(1, max(1, len(r.media)) + 1)
+        reaches = [technique.support_mm(r.surfaces.curve(medium)) for medium in media]
+        if technique.domain == "screen" and None not in reaches:
+            reach_px = ROUNDING_PX + max(reaches) * self.view.pixels_per_mm / self.nearest_mm
+        return pieces(self.width, self.height, reach_px, r.supersample)
+
+    def scatter(self, technique: Technique, piece: Piece | None = None) -> gl.Target:
         """Scattered irradiance and counts of all media: one pass of the technique for each."""
+        piece = piece or self.whole
         media = range(1, max(1, len(self.renderer.media)) + 1)
-        given = _light(technique)
-        first = technique.scatter(self.inputs(**given, medium=1)).target
+        first = self._scattered(technique, 1, piece)
         if len(media) == 1:
             return first
-        total = gl.Target(self.width, self.height, list(RESULT_FORMATS))
+        total = gl.Target(self.width, piece.rows, list(RESULT_FORMATS))
         total.bind(clear=(0.0, 0.0, 0.0, 0.0))
-        self.renderer.program("passes/copy.frag").use(source=self.surface.textures[0])
-        GL.glDrawBuffers(1, [GL.GL_COLOR_ATTACHMENT0])
+        total.bind(only=0)
+        ids = self.surface.textures[0]
+        self.renderer.program("passes/copy.frag").use(source=ids, first_row=piece.first)
         gl.draw_fullscreen(self.renderer.context)
-        GL.glDrawBuffers(2, [GL.GL_COLOR_ATTACHMENT0, GL.GL_COLOR_ATTACHMENT1])
         for medium in media:
             if medium > 1:
-                first = technique.scatter(self.inputs(**given, medium=medium)).target
+                first = self._scattered(technique, medium, piece)
             total.bind()
             self.renderer.program("passes/pick.frag").use(
-                irradiance=self.surface.textures[0],
+                irradiance=ids,
                 scattered=first.textures[0],
                 count=first.textures[1],
                 medium=float(medium),
+                first_row=piece.first,
             )
             gl.draw_fullscreen(self.renderer.context)
             first.delete()
         return total
 
+    def _scattered(self, technique: Technique, medium: int, piece: Piece) -> gl.Target:
+        """One medium's scattered light; what the technique was given is freed."""
+        inputs = self.inputs(**_light(technique), medium=medium, piece=piece)
+        target = technique.scatter(inputs).target
+        del inputs
+        self.renderer.context.free_dropped()
+        gl.draw_nothing()
+        return target
+
     def render(self, technique: Technique) -> Result:
         """The image of one technique."""
         r = self.renderer
         r.context.make_current()
-        with self.scatter(technique) as scattered:
-            light, info = scattered.textures
-            image = composite(
-                r.context,
-                r.program,
-                light,
-                self.surface,
-                self.hair,
-                self.picture,
-                self.view,
-                r.surroundings,
-                r.supersample,
-                technique.texturing,
-                technique.diffuse == "conserving",
-            )
-            counts = info.read()
-        contrast = counts[..., 1].copy() if technique.measures_contrast else None
-        return Result(image, np.rint(counts[..., 0]).astype(np.uint16), contrast)
+        s = r.supersample
+        image = np.empty((self.height // s, self.width // s, 3), np.uint8)
+        samples = np.empty((self.height, self.width), np.uint16)
+        contrast = np.empty(samples.shape, np.float32) if technique.measures_contrast else None
+        for piece in self.pieces(technique):
+            with self.scatter(technique, piece) as scattered:
+                light, info = scattered.textures
+                image[piece.image_rows(self.height, s)] = composite(
+                    r.context,
+                    r.program,
+                    light,
+                    self.surface,
+                    self.picture,
+                    self.view,
+                    r.surroundings,
+                    s,
+                    technique.texturing,
+                    technique.diffuse == "conserving",
+                    piece,
+                )
+                counts = info.read()[piece.own_rows()]
+            rows = piece.image_rows(self.height)
+            samples[rows] = np.rint(counts[..., 0])
+            if contrast is not None:
+                contrast[rows] = counts[..., 1]
+            del counts
+            give_back()
+        return Result(image, samples, contrast)
 
     def time(self, techniques: dict[str, Technique], rounds: int) -> dict[str, np.ndarray]:
         """Seconds that scattering alone takes: name -> (rounds, 2) of wall and CPU time.
 
         The techniques run in turn, so that a machine's drift hits all alike; a round that compiles
-        shaders goes before.
+        shaders goes before. Pictures are drawn in one piece, which takes more memory than `render`.
         """
         self.renderer.context.make_current()
-        spent = {name: np.empty((rounds, 2)) for name in techniques}
+        spent = {name: np.zeros((rounds, 2)) for name in techniques}
         for k in range(-1, rounds):
             for name, technique in techniques.items():
-                self.inputs(**_light(technique))
-                gl.finish()
-                start = np.array([time.perf_counter(), time.process_time()])
-                scattered = self.scatter(technique)
-                gl.finish()
-                if k >= 0:
-                    spent[name][k] = np.array([time.perf_counter(), time.process_time()]) - start
-                scattered.delete()
+                for medium in range(1, max(1, len(self.renderer.media)) + 1):
+                    inputs = self.inputs(**_light(technique), medium=medium)
+                    gl.finish()
+                    start = np.array([time.perf_counter(), time.process_time()])
+                    scattered = technique.scatter(inputs).target
+                    gl.finish()
+                    if k >= 0:
+                        spent[name][k] += [time.perf_counter(), time.process_time()] - start
+                    scattered.delete()
         return spent
 
     def close(self) -> None:
         """Free the shared buffers."""
         self.renderer.context.make_current()
-        for target in (*self._given.values(), *self._shaded.values(), self.hair, self.surface):
+        for target in (*self._shaded.values(), self.surface):
             target.delete()
-        self._given.clear()
         self._shaded.clear()
 
 

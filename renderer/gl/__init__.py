@@ -3,7 +3,7 @@
 from renderer.gl.context import GL, PLATFORMS, Context
 from renderer.gl.mesh import Mesh, draw_fullscreen, finish
 from renderer.gl.program import Program, source
-from renderer.gl.texture import DepthArray, Target, Texture, TextureArray
+from renderer.gl.texture import DepthArray, Target, Texture, TextureArray, draw_nothing
 
 __all__ = [
     "GL",
@@ -16,6 +16,7 @@ __all__ = [
     "Texture",
     "TextureArray",
     "draw_fullscreen",
+    "draw_nothing",
     "finish",
     "source",
 ]

@@ -24,13 +24,16 @@ class Context:
 
     What is made while a context is current belongs to it. Textures, targets and meshes are freed
     by their delete(), and those that are dropped without it are freed before the next one is made:
-    nothing leaks, whoever forgets.
+    nothing leaks, whoever forgets. held: bytes of all that is not freed yet; most: the most that
+    was ever held at once (set it to `held` to begin anew).
     """
 
     current: Context | None = None
 
     def __init__(self):
-        self._dropped: list[tuple[Callable[[int], None], int]] = []
+        self._dropped: list[tuple[Callable[[int], None], int, int]] = []
+        self.held = self.most = 0
+        self.nothing: tuple | None = None  # what draw_nothing draws with
         name = os.environ["PYOPENGL_PLATFORM"]
         if name not in PLATFORMS:
             raise InputError(
@@ -77,8 +80,11 @@ class Context:
     def free_dropped(self) -> None:
         """Free what nobody holds any more."""
         while self._dropped:
-            free, name = self._dropped.pop()
-            free(name)
+            self._free(*self._dropped.pop())
+
+    def _free(self, free: Callable[[int], None], name: int, size: int) -> None:
+        free(name)
+        self.held -= size
 
     def close(self) -> None:
         """Destroy the context and all that it holds."""
@@ -99,8 +105,8 @@ class Context:
         self._platform = None
 
 
-def owned(owner: object, name: int, free: Callable[[int], None]) -> weakref.finalize:
-    """Tie an OpenGL name to its owner: call the result to free it now.
+def owned(owner: object, name: int, free: Callable[[int], None], size: int = 0) -> weakref.finalize:
+    """Tie an OpenGL name to its owner: call `free` with the result to free it now. size: its bytes.
 
     When the owner is dropped without that, the name is put by and freed by its own context, which
     need not be the current one then.
@@ -109,11 +115,15 @@ def owned(owner: object, name: int, free: Callable[[int], None]) -> weakref.fina
     if context is None:
         raise RuntimeError("no OpenGL context is current; expected an open renderer")
     context.free_dropped()
-    return weakref.finalize(owner, context._dropped.append, (free, name))
+    context.held += size
+    context.most = max(context.most, context.held)
+    return weakref.finalize(owner, context._dropped.append, (free, name, size))
 
 
 def free(handle: weakref.finalize) -> None:
     """Free a name at once; a second time does nothing."""
     if (kept := handle.detach()) is not None:
-        _, _, ((release, name),), _ = kept
-        release(name)
+        _, put_by, (entry,), _ = kept
+        put_by(entry)
+        if Context.current is not None:
+            Context.current.free_dropped()

@@ -37,7 +37,7 @@ class Mesh:
 
     def _buffer(self, kind: int, array: np.ndarray) -> None:
         name = GL.glGenBuffers(1)
-        self._handles.append(owned(self, name, _delete_buffer))
+        self._handles.append(owned(self, name, _delete_buffer, array.nbytes))
         GL.glBindBuffer(kind, name)
         GL.glBufferData(kind, array.nbytes, array, GL.GL_STATIC_DRAW)
 

@@ -1,8 +1,8 @@
 // Scattered irradiance to radiance, specular on top, hair over it, a studio backdrop behind; tone mapped, still linear.
 #include "shaders/common.glsl"
+#include "shaders/screen.glsl"
 #include "shaders/environment.glsl"
-in vec2 uv;
-uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albedo; uniform sampler2D depths; uniform sampler2D hair;
+uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albedo; uniform sampler2D depths;
 uniform float exposure;
 uniform float conserving;  // 1: what the face sends back inside does not get out
 uniform float texturing;  // the power of the albedo that is in the scattered light already
@@ -10,6 +10,7 @@ uniform int tone_map; uniform int backdrop;  // places in the lists of renderer/
 uniform mat3 rays;                           // normalised device coordinates to directions in the world
 uniform vec3 backdrop_centre; uniform vec3 backdrop_edge;
 uniform float aspect;
+uniform int scattered_row;  // of what is drawn, in the scattered light
 out vec4 colour;
 
 // Narkowicz 2016, "ACES filmic tone mapping curve".
@@ -22,23 +23,24 @@ vec3 hable(vec3 x) { return hable_curve(2.0 * x) / hable_curve(vec3(11.2)); }
 vec3 toned(vec3 x) { return tone_map == 0 ? filmic(x) : tone_map == 1 ? hable(x) : x; }
 
 vec3 behind() {
+    vec2 uv = image_pixel() / image_size;
     vec2 d = (uv - vec2(0.5, 0.52)) * vec2(aspect, 1.0);
     if (backdrop == 0) return mix(backdrop_centre, backdrop_edge, smoothstep(0.0, 1.0, length(d)));
     return environment(normalize(rays * vec3(uv * 2.0 - 1.0, 1.0)), 4096.0);
 }
 
 void main() {
-    ivec2 at = ivec2(gl_FragCoord.xy);
+    ivec2 at = ivec2(image_pixel());
     float depth = texelFetch(depths, at, 0).x;
+    vec4 over = texelFetch(specular, at, 0);  // highlights under hair, and what hair hides
     vec3 radiance = behind();
     if (depth > 0.0) {
         vec4 face = texelFetch(albedo, at, 0);
         vec3 own = max(face.rgb, 0.0);
         vec3 left = texturing == 0.0 ? own : pow(max(own, 1e-6), vec3(1.0 - texturing));
-        vec4 light = texelFetch(scattered, at, 0);
-        radiance = (light.a > 0.5 ? left : own) * mix(1.0, face.a, conserving) * light.rgb / PI + texelFetch(specular, at, 0).rgb;
+        vec4 light = texelFetch(scattered, ivec2(gl_FragCoord.xy) + ivec2(0, scattered_row), 0);
+        radiance = (light.a > 0.5 ? left : own) * mix(1.0, face.a, conserving) * light.rgb / PI;
     }
-    vec4 strands = texelFetch(hair, at, 0);
-    radiance = radiance * (1.0 - strands.a) + strands.rgb;
+    radiance = radiance * (1.0 - over.a) + over.rgb;
     colour = vec4(clamp(toned(exposure * radiance), 0.0, 1.0), 1.0);
 }

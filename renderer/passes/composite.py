@@ -9,6 +9,7 @@ import numpy as np
 from renderer import gl
 from renderer.gl import GL
 from renderer.passes.environment import Surroundings
+from renderer.passes.pieces import Piece
 from renderer.scene.picture import BACKDROPS, TONE_MAPS, Picture
 from renderer.scene.view import View
 
@@ -18,29 +19,33 @@ def composite(
     programs: Callable[..., gl.Program],
     scattered: gl.Texture,
     surface: gl.Target,
-    hair: gl.Target,
     picture: Picture,
     view: View,
     surroundings: Surroundings,
     supersample: int,
     texturing: float = 0.0,
     conserving: bool = False,
+    piece: Piece | None = None,
 ) -> np.ndarray:
-    """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers.
+    """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers, or the rows of
+    it that are right in a piece.
 
     texturing: the power of the albedo that scattered light has already been multiplied by;
     conserving: the face holds back what it reflects inside.
     """
     width, height = surface.width, surface.height
+    piece = piece or Piece(0, height, 0, height)
     _, specular, albedo, depths, _ = surface.textures
     programs_uniforms = {
         "scattered": scattered,
+        "scattered_row": piece.low - piece.first,
+        "image_size": (width, height),
+        "first_row": piece.low,
         "specular": specular,
         "albedo": albedo,
         "texturing": texturing,
         "conserving": float(conserving),
         "depths": depths,
-        "hair": hair.textures[0],
         "exposure": picture.exposure,
         "tone_map": TONE_MAPS.index(picture.tone_map),
         "backdrop": BACKDROPS.index(picture.backdrop),
@@ -51,14 +56,19 @@ def composite(
         **surroundings.uniforms(),
     }
     program = programs("passes/composite.frag", surroundings.defines())
-    size = (width // supersample, height // supersample)
-    with gl.Target(width, height, [GL.GL_RGBA16F]) as colour:
+    rows = piece.high - piece.low
+    size = (width // supersample, rows // supersample)
+    with gl.Target(width, rows, [GL.GL_RGBA16F]) as colour:
         colour.bind()
         program.use(**program.accepts(programs_uniforms))
         gl.draw_fullscreen(context)
         with gl.Target(*size, [GL.GL_RGBA32F]) as final:
             final.bind()
-            programs("passes/resolve.frag").use(colour_map=colour.textures[0], factor=supersample)
+            programs("passes/resolve.frag").use(
+                colour_map=colour.textures[0],
+                factor=supersample,
+                first_row=piece.low // supersample,
+            )
             gl.draw_fullscreen(context)
             pixels = final.textures[0].read()[..., :3]
     return np.rint(pixels * 255).astype(np.uint8)

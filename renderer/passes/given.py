@@ -17,11 +17,13 @@ def draw_given(
     medium: int,
     translucent: bool,
     texturing: float,
+    first_row: int = 0,
 ) -> None:
     """Draw irradiance with alpha 1 where the medium scatters, 0 elsewhere.
 
     medium: the id in irradiance's alpha; translucent: with the transmitted light added (Jimenez et
-    al. 2010: before scattering, not shadowed); texturing: times the albedo to this power.
+    al. 2010: before scattering, not shadowed); texturing: times the albedo to this power;
+    first_row: of what is drawn, among the rows of the textures.
     """
     into.bind()
     programs("passes/given.frag").use(
@@ -31,5 +33,6 @@ def draw_given(
         medium=float(medium),
         through=float(translucent),
         texturing=texturing,
+        first_row=first_row,
     )
     gl.draw_fullscreen(context)

@@ -1,5 +1,6 @@
 // One sample of Burley's disc in screen space (Golubev 2018), shared by golubev and golubev_plus.
 #include "shaders/common.glsl"
+#include "shaders/screen.glsl"
 uniform sampler2D irradiance; uniform sampler2D depths;
 uniform vec4 samples[SAMPLES];    // x, y, radius in mm; 1 / density
 uniform vec3 shape;               // s = 1 / d per channel, 1/mm
@@ -19,10 +20,10 @@ bool begin(out Pixel p) {
     count = vec4(skin ? 1.0 : 0.0, 0.0, 0.0, 1.0);
     p.irradiance = centre.rgb;
     p.depth = texelFetch(depths, ivec2(gl_FragCoord.xy), 0).x;
-    p.at = gl_FragCoord.xy;
-    p.size = vec2(textureSize(irradiance, 0));
+    p.at = image_pixel();
+    p.size = image_size;
     p.scale = pixels_per_mm / max(p.depth, 1e-3);
-    float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
+    float angle = 2.0 * PI * interleaved_gradient_noise(image_pixel());
     p.turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
     return skin && filter_radius_mm * p.scale >= 1.0;
 }
@@ -31,9 +32,9 @@ bool begin(out Pixel p) {
 vec4 take(int k, Pixel p, inout Sum sum) {
     vec4 s = samples[k];
     vec2 there = (p.at + p.turn * s.xy * p.scale) / p.size;
-    vec4 e = texture(irradiance, there);
+    vec4 e = texel_at(irradiance, there);
     if (e.a < 0.5) return vec4(0.0);
-    float dz = texture(depths, there).x - p.depth;
+    float dz = texel_at(depths, there).x - p.depth;
     float r = sqrt(s.z * s.z + dz * dz);
     vec3 third = exp(-shape * r / 3.0);
     vec3 w = shape * (third * third * third + third) * s.w;  // R(r') r' over R(r) r

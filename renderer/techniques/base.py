@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 class Inputs:
     """The shared buffers, all (height, width) at the resolution at which scattering is computed.
 
+    They hold the whole image, or a piece of it if the technique says how far it reaches
+    (`support_mm`): the rows from first_row on, counted from below, of image_height.
+
     irradiance: RGBA32F, rgb = E, alpha = 1 where the medium at hand scatters. depths: R32F, view
     depth in mm (0 where nothing is). pixels_per_mm: pixels of this resolution per mm at 1 mm
     distance. supersample: pixels of this resolution per output pixel, along one side. curve: the
@@ -40,6 +43,13 @@ class Inputs:
     supersample: int
     curve: Curve
     room: Room | None = None
+    first_row: int = 0
+    image_height: int = 0
+
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """(width, height) of the whole image, px."""
+        return self.width, self.image_height or self.height
 
     def needed_room(self, technique: str) -> Room:
         """The room, for techniques that work over another domain than the screen."""
@@ -128,6 +138,14 @@ class Technique(Parameters):
 
     def self_check(self, curve: Curve) -> None:
         """Raise AssertionError if the kernel for a curve is not what the paper says."""
+
+    def support_mm(self, curve: Curve) -> float | None:
+        """How far from a point its light comes from at most; None: from anywhere.
+
+        A filter of the screen that knows is given the image in pieces, which takes less memory; its
+        shader takes places in the image from shaders/screen.glsl.
+        """
+        return None
 
     def scatter(self, inputs: Inputs) -> Scattered:
         """Run the technique."""

@@ -87,6 +87,9 @@ class Golubev(ScreenTechnique):
         """The samples in the order in which they are taken: (samples, 4), see `disc`."""
         return disc(self.samples, float(self.distances(curve).max()))
 
+    def support_mm(self, curve: Curve) -> float:
+        return float(self.table(curve)[:, 2].max())
+
     def defines(self) -> dict[str, Any]:
         return {"SAMPLES": self.samples, "SURFACE_WEIGHTS": int(self.weights == "surface")}
 

@@ -1,4 +1,5 @@
 // One axis of one Gaussian.
+#include "shaders/screen.glsl"
 uniform sampler2D source; uniform sampler2D irradiance; uniform sampler2D depths;
 uniform float taps[7];
 uniform float sigma;          // mm, incremental
@@ -19,14 +20,14 @@ void main() {
     if (texelFetch(irradiance, at, 0).a < 0.5) return;
     float slope = abs(dot(derivative, axis)), tangent = slope * focal / depth;
     float near = published == 1 ? 1.0 / (depth + beta * min(slope, gradient_limit)) : inversesqrt(1.0 + tangent * tangent) / depth;
-    vec2 stride = axis * sigma * alpha * near / vec2(textureSize(source, 0));
-    vec2 uv = gl_FragCoord.xy / vec2(textureSize(source, 0));
+    vec2 stride = axis * sigma * alpha * near / image_size;
+    vec2 uv = image_pixel() / image_size;
     vec3 sum = taps[reach] * centre.rgb;
     for (int k = -reach; k <= reach; ++k) {
         if (k == 0) continue;
         vec2 there = uv + float(k) * stride;
         // the stencil of the paper: what is not skin does not bleed in; the centre stands for it
-        sum += taps[k + reach] * (texture(irradiance, there).a > 0.5 ? texture(source, there).rgb : centre.rgb);
+        sum += taps[k + reach] * (texel_at(irradiance, there).a > 0.5 ? texel_at(source, there).rgb : centre.rgb);
     }
     blurred = vec4(sum, 1.0);
 }

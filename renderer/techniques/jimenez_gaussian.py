@@ -12,8 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from renderer.optics.curve import Curve
 from renderer.parameters import parameter
-from renderer.techniques.cascade import ADD, START, SumOfGaussians
+from renderer.techniques.cascade import ADD, START, TAPS, SumOfGaussians
 from renderer.techniques.screen import Canvas, ScreenTechnique
 
 
@@ -54,6 +55,13 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
     name: ClassVar[str] = "jimenez_gaussian"
     title: ClassVar[str] = "Gaussian"
     paper: ClassVar[str] = "Jimenez et al. 2009, doi:10.1145/1609967.1609970"
+
+    def support_mm(self, curve: Curve) -> float | None:
+        if self.alpha:
+            return None  # its widths are no millimetres
+        _, spacing, _ = self.axis_taps()
+        blurs, _ = self.blurs(self.fit(curve))
+        return len(TAPS) // 2 * spacing * sum(sigma for sigma, _ in blurs)
 
     def passes(self, canvas: Canvas) -> None:
         inputs = canvas.inputs

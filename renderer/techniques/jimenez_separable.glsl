@@ -1,5 +1,6 @@
 // One of the two passes of the separable kernel.
 #include "shaders/common.glsl"
+#include "shaders/screen.glsl"
 uniform sampler2D source; uniform sampler2D irradiance; uniform sampler2D depths;
 uniform vec4 kernel[TAPS];       // rgb weight, offset in mm
 uniform int taps;                // no constant: an unrolled loop would run for pixels without skin too
@@ -19,9 +20,9 @@ void main() {
     float depth = texelFetch(depths, at, 0).x;
     vec2 slope = plane == 1 ? vec2(dFdx(depth), dFdy(depth)) : vec2(0.0);  // mm of depth a pixel
     if (texelFetch(irradiance, at, 0).a < 0.5) return;
-    vec2 size = vec2(textureSize(source, 0)), uv = gl_FragCoord.xy / size;
+    vec2 uv = image_pixel() / image_size;
     float scale = pixels_per_mm / depth;
-    float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
+    float angle = 2.0 * PI * interleaved_gradient_noise(image_pixel());
     mat2 turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
     vec3 sum = vec3(0.0);
     for (int k = 0; k < taps; ++k) {
@@ -29,10 +30,10 @@ void main() {
         vec2 direction = abs(offset) < near_mm ? turn * axis : axis;
         float tangent = dot(slope, direction) * scale;
         vec2 apart = direction * offset * scale * inversesqrt(1.0 + tangent * tangent);
-        vec2 there = uv + apart / size;
-        vec3 tap = texture(source, there).rgb;
-        float away = abs(texture(depths, there).x - depth - dot(slope, apart)) / follow_surface_mm;
-        if (texture(irradiance, there).a < 0.5) away = 1.0;
+        vec2 there = uv + apart / image_size;
+        vec3 tap = texel_at(source, there).rgb;
+        float away = abs(texel_at(depths, there).x - depth - dot(slope, apart)) / follow_surface_mm;
+        if (texel_at(irradiance, there).a < 0.5) away = 1.0;
         sum += kernel[k].rgb * mix(tap, centre.rgb, clamp(away, 0.0, 1.0));
     }
     scattered = vec4(sum, 1.0);

@@ -100,6 +100,11 @@ class JimenezSeparable(ScreenTechnique):
         x = np.asarray(x_mm, float)[:, None]
         return np.clip((-x - low) / (high - low), 0, 1) @ weights
 
+    def support_mm(self, curve: Curve) -> float:
+        """Of the second pass, and of the first one's rotated taps."""
+        offsets, _ = self.kernel_table(curve)
+        return self.scale * float(np.abs(offsets).max() + self.near_share * np.ptp(offsets))
+
     def self_check(self, curve: Curve) -> None:
         offsets, weights = self.kernel_table(curve)
         assert np.allclose(weights.sum(axis=0), 1, atol=1e-9) and np.isfinite(weights).all()

@@ -21,5 +21,8 @@ class NoScattering(ScreenTechnique):
     paper: ClassVar[str] = "Lambert 1760, Photometria"
     translucent: bool = parameter(False, source="light that comes through is scattered light")
 
+    def support_mm(self, curve: Curve) -> float:
+        return 0.0
+
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         return np.repeat((np.asarray(x_mm)[:, None] < 0) * 1.0, curve.channels, axis=1)

@@ -15,12 +15,12 @@ from renderer.techniques.drawing import Drawing, result
 
 
 class Canvas(Drawing):
-    """The picture: the result, and irradiance, depths and pixels_per_mm for every pass."""
+    """The picture: the result, and what every pass is given that has a uniform of that name."""
 
     def __init__(self, inputs: Inputs, result: gl.Target):
         super().__init__(inputs, inputs.width, inputs.height)
         self.result = result
-        names = ("irradiance", "depths", "pixels_per_mm")
+        names = ("irradiance", "depths", "pixels_per_mm", "image_size", "first_row")
         self.given = {name: getattr(inputs, name) for name in names}
 
 

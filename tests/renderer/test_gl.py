@@ -38,7 +38,7 @@ def test_blending(drawing, blend):
     with gl.Target(2, 2, [GL.GL_RGBA32F]) as target:
         target.bind(clear=(1.0, 1.0, 1.0, 1.0))
         target.bind(blend=blend)
-        drawing.program("passes/copy.frag").use(source=texture)
+        drawing.program("passes/copy.frag").use(source=texture, first_row=0)
         gl.draw_fullscreen(drawing.context)
         np.testing.assert_allclose(target.textures[0].read(), 1.5 if blend == "add" else 1.0)
 

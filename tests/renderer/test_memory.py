@@ -1,0 +1,86 @@
+"""Memory: an image is filtered in pieces that give the bytes of the whole; nothing is kept."""
+
+import numpy as np
+import pytest
+
+import renderer
+from renderer.passes import pieces as cutting
+from renderer.passes.pieces import PIECE_PIXELS, Piece, pieces
+from tests.renderer.slab import frame_of_ball
+
+#: Bytes a pixel: irradiance 16, specular, albedo and transmitted light 8 each, depths and depth
+#: buffer 4 + 4; of a piece, light 16, depth 4, result 20, and two targets of a filter.
+FRAME_BYTES, PIECE_BYTES = 48, 72
+
+
+@pytest.mark.parametrize("supersample", [1, 2, 3, 4])
+@pytest.mark.parametrize("reach", [0.0, 7.3, 60.0, 500.0])
+def test_pieces_cover_every_row_once_with_all_that_their_light_comes_from(supersample, reach):
+    height = 360 * supersample
+    cut = pieces(640, height, reach, supersample, 640 * 150)
+    assert [piece.low for piece in cut] == [0, *(piece.high for piece in cut[:-1])]
+    assert cut[-1].high == height and (len(cut) > 1 or reach > height)
+    for piece in cut:
+        last = piece.first + piece.rows
+        assert piece.first == 0 or piece.low - piece.first >= reach
+        assert last == height or last - piece.high >= reach
+        assert piece.first % 2 == 0 and piece.low % supersample == 0
+    rows = [np.arange(height)[piece.image_rows(height)] for piece in reversed(cut)]
+    np.testing.assert_array_equal(np.concatenate(rows), np.arange(height))
+
+
+@pytest.mark.parametrize("reach", [None, float("inf")])
+def test_light_from_anywhere_and_small_images_make_one_piece(reach):
+    assert pieces(4000, 4000, reach, 2) == [Piece(0, 4000, 0, 4000)]
+    assert pieces(640, 360, 10.0, 2) == [Piece(0, 360, 0, 360)]
+
+
+def test_pieces_give_the_bytes_of_the_whole(frames, results, techniques, monkeypatch):
+    monkeypatch.setattr(cutting, "PIECE_PIXELS", 640 * 200)
+    frame = frames["close-up"]
+    cut = {name: len(frame.pieces(technique)) for name, technique in techniques.items()}
+    assert {name for name, count in cut.items() if count > 1} == {
+        name for name, kind in renderer.TECHNIQUES.items() if kind.domain == "screen"
+    }
+    for name, whole in results["close-up"].items():
+        if cut[name] == 1:
+            continue
+        result = frame.render(techniques[name])
+        np.testing.assert_array_equal(result.image, whole.image, err_msg=name)
+        np.testing.assert_array_equal(result.samples, whole.samples, err_msg=name)
+        if whole.contrast is not None:
+            np.testing.assert_array_equal(result.contrast, whole.contrast, err_msg=name)
+
+
+def test_a_frame_and_its_pieces_hold_what_is_reckoned_and_free_it(drawing, monkeypatch):
+    """So that 3840x2160 pixels take 630 MB of buffers at most, with the thesis's techniques."""
+    assert FRAME_BYTES * 3840 * 2160 + PIECE_BYTES * PIECE_PIXELS < 630e6
+    context, pixels = drawing.context, 640 * 360
+    monkeypatch.setattr(cutting, "PIECE_PIXELS", pixels // 2)
+    context.make_current()
+    before = context.held
+    with drawing.frame(renderer.FRAMINGS["half-length"]) as frame:
+        shared = context.held
+        assert shared - before <= FRAME_BYTES * pixels
+        for name in ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian"):
+            technique = renderer.make(name)
+            largest = max(piece.rows for piece in frame.pieces(technique)) * frame.width
+            assert largest < pixels
+            context.most = context.held
+            frame.render(technique)
+            assert context.most - shared <= PIECE_BYTES * largest, name
+            context.make_current()
+            assert context.held == shared, name
+    assert context.held == before
+
+
+def test_techniques_over_surfaces_keep_nothing(techniques):
+    with frame_of_ball((96, 96)) as frame:
+        context = frame.renderer.context
+        for name, technique in techniques.items():
+            frame.scatter(technique).delete()  # a diffuse model of its own is kept by the frame
+            context.make_current()
+            before = context.held
+            frame.scatter(technique).delete()
+            context.make_current()
+            assert context.held == before, name
