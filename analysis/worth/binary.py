@@ -141,11 +141,18 @@ def connected(wins: np.ndarray) -> np.ndarray:
     """wins (R, n, n) -> (R,) bool: from every item a chain of wins leads to every other one, and
     only then there is a finite maximum (Ford 1957, doi:10.2307/2308513).
     """
+    return reachable(wins).all(axis=(1, 2))
+
+
+def reachable(wins: np.ndarray) -> np.ndarray:
+    """wins (R, n, n) -> (R, n, n) bool: whether a chain of wins leads from i to j, or they are one
+    item.
+    """
     n = wins.shape[-1]
     reach = ((wins > 0) | np.eye(n, dtype=bool)).astype(np.float32)
     for _ in range(max(1, int(np.ceil(np.log2(max(n, 2)))))):
         reach = np.minimum(reach @ reach, 1)
-    return (reach > 0).all(axis=(1, 2))
+    return reach > 0
 
 
 def differences(n: int) -> np.ndarray:

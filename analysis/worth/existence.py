@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import optimize
-from scipy.sparse import csgraph
 
 from analysis.options import FEWEST_PEOPLE
 from analysis.panel import Panel, tied, wins
+from analysis.worth.binary import reachable
 from analysis.worth.categories import recoded
 from analysis.worth.ties import FEATURES
 
@@ -26,12 +26,11 @@ def impossible(panel: Panel, model: str) -> str | None:
     strict, level = wins(panel, panel.counts, "drop"), tied(panel, panel.counts)
     if not strict.any():
         return "every answer is 'no difference'"
-    groups, label = csgraph.connected_components(
-        strict + level > 0, directed=True, connection="weak"
-    )
-    if groups > 1:
+    compared = strict + level
+    first = reachable((compared + compared.T)[None])[0, 0]
+    if not first.all():
         return (
-            f"{_names(panel, label == 0)} and {_names(panel, label != 0)} were never "
+            f"{_names(panel, first)} and {_names(panel, ~first)} were never "
             "compared, not even through others"
         )
     if model == "ordinal" and panel.people < FEWEST_PEOPLE:
@@ -52,11 +51,11 @@ def no_maximum(panel: Panel, model: str, ties: str = "half") -> str | None:
     """
     strict, level = wins(panel, panel.counts, "drop"), tied(panel, panel.counts)
     edges = wins(panel, panel.counts, ties) if model in BINARY else strict + level
-    groups, label = csgraph.connected_components(edges > 0, directed=True, connection="strong")
-    if groups > 1:
+    leads = reachable(edges[None])[0]
+    if not leads.all():
         ends = [
             (inside.sum(), order, never, inside)
-            for inside in (label == group for group in range(groups))
+            for inside in np.unique(leads & leads.T, axis=0)
             for order, (never, matrix) in enumerate(
                 (("beaten by", edges), ("preferred to", edges.T))
             )
