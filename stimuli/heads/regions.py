@@ -23,6 +23,18 @@ PLACES = (
     "eyelids",
 )
 _LINES = ("hairline", "beard_top", "beard_bottom")
+_RAMPS = (
+    "hairline_soft_mm",
+    "hairline_deg",
+    "beard_top_soft_mm",
+    "beard_bottom_soft_mm",
+    "beard_front_mm",
+    "forehead_mm",
+    "forehead_deg",
+    "chest_mm",
+    "chest_half_mm",
+    "neck_mm",
+)
 _WEIGHTS = {
     "flush": {
         "cheeks": 0.55,
@@ -73,6 +85,15 @@ def _radius(default: float) -> float:
     return parameter(default, unit="mm", low=1.0, high=100.0, source="of a soft spot, by eye")
 
 
+def _ramp(*default: float) -> tuple[float, ...]:
+    """Where a feature begins and where it is whole, at each of its ends."""
+    return parameter(default, unit="mm", low=-500.0, high=500.0, source="by eye")
+
+
+def _degrees(*default: float) -> tuple[float, ...]:
+    return parameter(default, unit="degrees", low=0.0, high=180.0, source="by eye")
+
+
 @dataclass(frozen=True)
 class Regions(Parameters):
     """Where the features of a generated person's skin lie; all defaults were chosen by eye.
@@ -81,6 +102,12 @@ class Regions(Parameters):
     and rising; height above the eyes in mm) of lines that both sides share. flush, pores, oil: how
     much of it lies at each of PLACES, summed; smooth: the share of pores that is missing there. A
     table goes over the defaults place by place.
+
+    The lines wander by line_noise_mm (hairline, top and bottom of the beard) over
+    line_noise_scale_mm. Ramps say where something begins and where it is whole: *_soft_mm across a
+    line, forehead_mm, chest_mm and neck_mm above the eyes (the forehead's end too), chest_half_mm
+    and forehead_deg to the sides, beard_front_mm along z; a person's `hairline_mm` counts in full
+    within hairline_deg[1]. In two spots of beard_thin_mm the share beard_thin of it is missing.
     """
 
     called: ClassVar[str] = "regions"
@@ -88,6 +115,32 @@ class Regions(Parameters):
     hairline: tuple[tuple[float, float], ...] = _HAIRLINE
     beard_top: tuple[tuple[float, float], ...] = _BEARD_TOP
     beard_bottom: tuple[tuple[float, float], ...] = _BEARD_BOTTOM
+    line_noise_mm: tuple[float, float, float] = parameter(
+        (2.8, 3.0, 5.0), unit="mm", low=0.0, high=50.0, source="by eye"
+    )
+    line_noise_scale_mm: float = parameter(9.0, unit="mm", low=0.5, high=200.0, source="by eye")
+    hairline_soft_mm: tuple[float, float] = _ramp(-5.0, 7.0)
+    hairline_deg: tuple[float, float] = _degrees(60.0, 30.0)
+    beard_top_soft_mm: tuple[float, float] = _ramp(-3.0, 9.0)
+    beard_bottom_soft_mm: tuple[float, float] = _ramp(-14.0, 14.0)
+    beard_front_mm: tuple[float, float] = _ramp(2.0, 32.0)
+    beard_thin: float = parameter(0.55, low=0.0, high=1.0, source="by eye")
+    beard_thin_place_mm: tuple[float, float] = parameter(
+        (13.0, 11.0), unit="mm outwards and below the mouth", low=0.0, high=100.0, source="by eye"
+    )
+    beard_thin_mm: float = _radius(5.0)
+    forehead_mm: tuple[float, float, float, float] = _ramp(20.0, 34.0, 66.0, 50.0)
+    forehead_deg: tuple[float, float] = _degrees(55.0, 40.0)
+    chest_mm: tuple[float, float] = _ramp(-170.0, -230.0)
+    chest_half_mm: tuple[float, float] = _ramp(110.0, 30.0)
+    neck_mm: tuple[float, float] = _ramp(-115.0, -170.0)
+    wings_place_mm: tuple[float, float, float] = parameter(
+        (13.0, 3.0, 14.0),
+        unit="mm outwards, below and behind the tip of the nose",
+        low=-100.0,
+        high=100.0,
+        source="by eye",
+    )
     nose_mm: float = _radius(11.0)
     wings_mm: float = _radius(8.0)
     cheek_mm: float = _radius(17.0)
@@ -102,6 +155,12 @@ class Regions(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        for name in _RAMPS:
+            ends = getattr(self, name)
+            if ends[0] == ends[1] or ends[-1] == ends[-2]:
+                raise InputError(
+                    f"{self.where(name)} is {ends}; expected two places, not one twice"
+                )
         for name in _LINES:
             object.__setattr__(self, name, _line(self.where(name), getattr(self, name)))
         for name, default in _WEIGHTS.items():

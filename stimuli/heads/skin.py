@@ -49,25 +49,24 @@ def masks(
         return np.exp(-((p - centre) ** 2).sum(axis=1) / (2 * radius**2))
 
     around = azimuth(p)
-    wob = _wobble(p, 9.0)
+    wander = _wobble(p, regions.line_noise_scale_mm)
+    noise_line, noise_top, noise_bottom = regions.line_noise_mm
     off_ear = 1 - smoothstep(0.15, 0.6, own["ears"])
     line = np.interp(around, *np.transpose(regions.hairline))
-    line = line - hairline_mm * smoothstep(60, 30, around)
-    hair = smoothstep(-5.0, 7.0, up - line + 2.8 * wob) * off_ear
+    line = line - hairline_mm * smoothstep(*regions.hairline_deg, around)
+    hair = smoothstep(*regions.hairline_soft_mm, up - line + noise_line * wander) * off_ear
     top = np.interp(around, *np.transpose(regions.beard_top))
     bottom = np.interp(around, *np.transpose(regions.beard_bottom))
     beard = (
-        smoothstep(-3, 9, top - up + 3.0 * wob)
-        * smoothstep(-14, 14, up - bottom + 5 * wob)
-        * smoothstep(30, 60, p[:, 2] + 28)
+        smoothstep(*regions.beard_top_soft_mm, top - up + noise_top * wander)
+        * smoothstep(*regions.beard_bottom_soft_mm, up - bottom + noise_bottom * wander)
+        * smoothstep(*regions.beard_front_mm, p[:, 2])
     )
     beard *= 1 - smoothstep(0.02, 0.25, own["lips"])
     # the hollow below the lower lip and the cheeks' middle are thinner
-    beard *= (
-        1
-        - 0.55 * blob(np.array([mouth[0] - 13, mouth[1] - 11, mouth[2]]), 5)
-        - 0.55 * blob(np.array([mouth[0] + 13, mouth[1] - 11, mouth[2]]), 5)
-    )
+    out, below = regions.beard_thin_place_mm
+    thin = [blob(mouth + [side * out, -below, 0.0], regions.beard_thin_mm) for side in (-1, 1)]
+    beard *= 1 - regions.beard_thin * thin[0] - regions.beard_thin * thin[1]
     beard *= (1 - hair) * off_ear
     inside = smoothstep(0.35, 0.8, own["inside-mouth"]) * (1 - smoothstep(0.05, 0.4, own["lips"]))
 
@@ -76,18 +75,21 @@ def masks(
     ]
     across, down = regions.cheek_place_mm
     cheeks = [surface(side * across, eyes[1] - down) for side in (1, -1)]
-    forehead = smoothstep(20, 34, up) * smoothstep(66, 50, up) * smoothstep(55, 40, around)
-    chest = smoothstep(-170, -230, up) * smoothstep(110, 30, np.abs(p[:, 0])) * (p[:, 2] > 20)
+    forehead = smoothstep(*regions.forehead_mm[:2], up) * smoothstep(*regions.forehead_mm[2:], up)
+    forehead = forehead * smoothstep(*regions.forehead_deg, around)
+    chest = smoothstep(*regions.chest_mm, up) * (p[:, 2] > 20)
+    chest = chest * smoothstep(*regions.chest_half_mm, np.abs(p[:, 0]))
+    wing = np.array(regions.wings_place_mm) * [1, -1, -1]
     places = {
         "everywhere": np.ones(len(p)),
         "cheeks": sum(blob(c, regions.cheek_mm) for c in cheeks),
         "nose": blob(nose, regions.nose_mm),
-        "wings": sum(blob(nose + [side * 13.0, -3.0, -14.0], regions.wings_mm) for side in (1, -1)),
+        "wings": sum(blob(nose + wing * [side, 1, 1], regions.wings_mm) for side in (1, -1)),
         "ears": own["ears"],
         "chin": blob(mark["chin"], regions.chin_mm),
         "forehead": forehead,
         "chest": chest,
-        "neck": smoothstep(-115, -170, up),
+        "neck": smoothstep(*regions.neck_mm, up),
         "eyelids": own["eyelids"],
     }
 
