@@ -52,7 +52,7 @@ def test_pieces_give_the_bytes_of_the_whole(frames, results, techniques, monkeyp
             np.testing.assert_array_equal(result.contrast, whole.contrast, err_msg=name)
 
 
-def test_a_frame_and_its_pieces_hold_what_is_reckoned_and_free_it(drawing, monkeypatch):
+def test_a_frame_and_its_pieces_hold_what_is_reckoned_and_free_it(frames, drawing, monkeypatch):
     """So that 3840x2160 pixels take 630 MB of buffers at most, with the thesis's techniques."""
     assert FRAME_BYTES * 3840 * 2160 + PIECE_BYTES * PIECE_PIXELS < 630e6
     context, pixels = drawing.context, 640 * 360
