@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 from alembic import command
 from alembic.config import Config
 from alembic.util import CommandError
-from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy import Connection, Engine, create_engine, delete, event, make_url
 from sqlalchemy.exc import ArgumentError, DatabaseError, NoSuchModuleError
 from sqlalchemy.orm import Session
 
 from app.errors import InputError
-from app.models import StudyRecord
+from app.models import Live, StudyRecord
 
 if TYPE_CHECKING:
     from app.study import Study
@@ -79,6 +79,7 @@ class Database:
             "design": study.design,
         }
         with self.write() as session:
+            session.execute(delete(Live))  # numbers of a release before this may have another shape
             record = session.get(StudyRecord, 1)
             if record is None:
                 session.add(StudyRecord(id=1, secret_key=secrets.token_hex(32), **expected))

@@ -277,10 +277,40 @@ def records(session: Session, study: Study, *, simulated: bool) -> Iterator[dict
         yield {column.name: column.value(row) for column in described}
 
 
+def judgements(session: Session, study: Study) -> list[dict[str, Any]]:
+    """What the numbers of the dashboard need of each answer, with the names of responses.csv: a
+    fraction of the columns, and no objects.
+    """
+    levels = {cell.name: cell.levels for cell in study.definition.cells}
+    query = counted(
+        Participant.id,
+        Participant.familiarity,
+        Trial.cell,
+        Trial.left,
+        Trial.right,
+        Trial.order,
+        Response.answer,
+        Response.rt_ms,
+    )
+    names = ("participant", "familiarity", "left", "right", "order", "answer", "rt_ms")
+    return [
+        dict(zip(names, (f"P{number:04d}", rating, left, right, order, answer, rt_ms)))
+        | levels[cell]
+        for number, rating, cell, left, right, order, answer, rt_ms in session.execute(
+            query.order_by(Participant.id, Trial.order)
+        )
+    ]
+
+
 def responses_csv(session: Session, study: Study, *, simulated: bool) -> Iterator[str]:
     """responses.csv, a chunk at a time."""
     names = [column.name for column in columns(study)]
     return _csv(names, (row.values() for row in records(session, study, simulated=simulated)))
+
+
+def table_csv(names: list[str], rows: Iterable[dict[str, Any]]) -> Iterator[str]:
+    """Mappings as a table."""
+    return _csv(names, ([row[name] for name in names] for row in rows))
 
 
 def completed_on(session: Session, code: str) -> date | None:

@@ -196,3 +196,19 @@ class Event(Base):
 
 
 Index(None, Event.participant_id, Event.trial_id, Event.kind)
+
+
+class Live(Base):
+    """The numbers of the dashboard, made once for all browsers and workers that look. One row;
+    nothing is lost with it.
+    """
+
+    __tablename__ = "live"
+    __table_args__ = (CheckConstraint("id = 1", name="one_row"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    about: Mapped[str] = mapped_column(String(50))  # the newest answer and event it counts
+    made_at: Mapped[datetime]
+    next_at: Mapped[datetime]  # not made anew before
+    claimed_until: Mapped[datetime | None]  # somebody is making it anew
+    numbers: Mapped[str]  # JSON

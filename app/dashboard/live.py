@@ -2,25 +2,89 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from datetime import datetime, timedelta
-from statistics import median
-from typing import Any
+from time import monotonic
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import case, func, select
 from sqlalchemy.orm import Session
 
 from app import export
-from app.models import Participant, Response, Trial, now
+from app.database import Database
+from app.models import Event, Live, Participant, Response, Trial, now
 from app.study import Study
 
+if TYPE_CHECKING:
+    from analysis.responses import Responses
+
+#: Numbers are at least so old when they are made anew, and making them takes at most this share of
+#: a core; `LIVE_PERIOD_S` of the application's settings is another period, 0 for none.
+PERIOD_S = 3.0
+SHARE = 0.05
+#: Numbers that are older are made anew though nothing happened.
+OLDEST = timedelta(minutes=1)
+#: How long others wait for somebody who is making numbers; who was killed meanwhile holds up no
+#: longer.
+CLAIM = timedelta(minutes=1)
+#: Participants on the page that updates itself; all are in participants.csv.
+LATEST = 50
 #: Without an answer for this long, an unfinished participant counts as dropped out (and may still
 #: come back).
 IDLE = timedelta(minutes=30)
 
 
-def numbers(db: Session, study: Study, *, simulated: bool) -> dict[str, Any]:
+def shared(database: Database, study: Study, period_s: float = PERIOD_S) -> dict[str, Any]:
+    """`numbers`, made once for all who look: anew when something happened since, but not before
+    `period_s` have passed, nor so often that it takes more than `SHARE` of a core.
+
+    It has a `version` beside, that changes with it.
+    """
+    with database.read() as db:
+        about, kept, time = _about(db), db.get(Live, 1), now()
+        if kept and not _due(kept, about, time):
+            return json.loads(kept.numbers)
+    with database.write() as db:
+        kept = db.get(Live, 1)
+        if kept and (_due(kept, about, time) is False or (kept.claimed_until or time) > time):
+            return json.loads(kept.numbers)
+        if kept:
+            kept.claimed_until = time + CLAIM
+    with database.read() as db:
+        about, began = _about(db), monotonic()
+        made = numbers(db, study)
+        made["version"] = f"{about}@{now().timestamp():.3f}"
+        pause = timedelta(seconds=max(period_s, (monotonic() - began) / SHARE) if period_s else 0)
+    with database.write() as db:
+        db.merge(
+            Live(
+                id=1,
+                about=about,
+                made_at=time,
+                next_at=now() + pause,
+                claimed_until=None,
+                numbers=json.dumps(made),
+            )
+        )
+    return made
+
+
+def _about(db: Session) -> str:
+    """Changes with everything that happens: rows are only ever appended."""
+    newest = select(select(func.max(Response.id)).scalar_subquery(), func.max(Event.id))
+    return "{}.{}".format(*(value or 0 for value in db.execute(newest).one()))
+
+
+def _due(kept: Live, about: str, time: datetime) -> bool:
+    old = time - kept.made_at > OLDEST  # who dropped out changes by itself
+    return time >= kept.next_at and (kept.about != about or old)
+
+
+def numbers(db: Session, study: Study) -> dict[str, Any]:
     """Everything the dashboard shows that changes; plain numbers and texts, ready for JSON."""
-    people = participants(db)
+    answers = responses(db, study)
+    people = participants(db, study, answers)
     states = [person["state"] for person in people]
     return {
         "summary": {
@@ -32,72 +96,104 @@ def numbers(db: Session, study: Study, *, simulated: bool) -> dict[str, Any]:
             "answers": export.count(db),
             "about_other_images": about_other_images(db, study),
         },
-        "participants": people,
-        "framings": framings(db, study, simulated=simulated),
+        "participants": people[:LATEST],
+        "framings": framings(answers, study),
         "sides": sides(db, study),
+        "stopped": stopped(people),
     }
 
 
-def participants(db: Session) -> list[dict[str, Any]]:
-    """Each participant, latest first: how far, in which state, the median time of an answer."""
-    times: dict[int, list[int]] = {}
-    last: dict[int, datetime] = {}
-    for participant, rt_ms, at in db.execute(
-        select(Response.participant_id, Response.rt_ms, Response.answered_at)
-    ):
-        times.setdefault(participant, []).append(rt_ms)
-        last[participant] = max(at, last.get(participant, at))
-    questions = dict(
+def responses(db: Session, study: Study) -> Responses | None:
+    """The answers that count, as the analysis takes them; None where there are none."""
+    records = export.judgements(db, study)
+    if not records:
+        return None
+    from analysis.codebook import of_study
+    from analysis.responses import responses_from_records
+
+    return responses_from_records(records, of_study(study.definition.record()))
+
+
+def participants(db: Session, study: Study, answers: Responses | None) -> list[dict[str, Any]]:
+    """Each participant, latest first: how far, in which state, the median time of an answer, and
+    which declared rules they break.
+    """
+    counted = select(Response.participant_id, func.count(), func.max(Response.answered_at))
+    given = {
+        one: (count, last)
+        for one, count, last in db.execute(counted.group_by(Response.participant_id))
+    }
+    asked = dict(
         db.execute(select(Trial.participant_id, func.count()).group_by(Trial.participant_id)).all()
     )
+    judged = quality(study, answers)
     result = []
     for person in db.scalars(select(Participant).order_by(Participant.id.desc())):
-        answered = times.get(person.id, [])
-        idle = now() - last.get(person.id, person.consented_at) > IDLE
-        state = "dropped out" if idle else "in progress"
+        count, last = given.get(person.id, (0, person.consented_at))
+        state = "dropped out" if now() - last > IDLE else "in progress"
         if person.completed_at:
             state = "completed"
         if person.withdrawn_at:
             state = "withdrawn"
+        median_ms, flags = judged.get(person.code, (None, ""))
         result.append(
             {
                 "code": person.code,
                 "familiarity": person.familiarity,
                 "began": person.consented_at.strftime("%Y-%m-%d %H:%M"),
-                "answered": len(answered),
-                "questions": questions.get(person.id, 0),
+                "answered": count,
+                "questions": asked.get(person.id, 0),
                 "state": state,
-                "median_s": round(median(answered) / 1000, 1) if answered else None,
+                "median_s": None if median_ms is None else round(median_ms / 1000, 1),
+                # who is half-way has not answered too little yet
+                "flags": flags if state != "in progress" else "",
             }
         )
     return result
 
 
-def framings(db: Session, study: Study, *, simulated: bool) -> list[dict[str, Any]]:
+def quality(study: Study, answers: Responses | None) -> dict[str, tuple[float, str]]:
+    """Participant -> median time of an answer, ms, and the study's rules of exclusion that apply
+    (`analysis.agreement`).
+    """
+    if answers is None:
+        return {}
+    from analysis.agreement import participants as judge
+    from analysis.declared import options
+
+    table = judge(answers, options(study.definition.analysis, "the study"))
+    return {row.participant: (row.median_rt_ms, row.excluded) for row in table.itertuples()}
+
+
+def stopped(people: list[dict[str, Any]]) -> list[dict[str, int]]:
+    """Where people stopped: after how many answers those who dropped out or withdrew left."""
+    left = Counter(
+        one["answered"] for one in people if one["state"] in ("dropped out", "withdrawn")
+    )
+    return [{"answered": answered, "people": left[answered]} for answered in sorted(left)]
+
+
+def framings(answers: Responses | None, study: Study) -> list[dict[str, Any]]:
     """For each framing: points and AHP priority of each technique, consistency, and what is still
     missing.
     """
-    records = list(export.records(db, study, simulated=simulated))
-    if not records:
+    if answers is None:
         return []
     from analysis import ahp, tallies
-    from analysis.codebook import of_study
-    from analysis.responses import responses_from_records
 
-    responses = responses_from_records(records, of_study(study.definition.record()))
     points = {
-        (row.framing, row.technique): row.score for row in tallies.scores(responses).itertuples()
+        (row.framing, row.technique): row.score for row in tallies.scores(answers).itertuples()
     }
-    totals = tallies.totals(responses).set_index("framing")
+    totals = tallies.totals(answers).set_index("framing")
     result = []
-    for framing, comparison in ahp.comparisons(responses).items():
+    for framing, comparison in ahp.comparisons(answers).items():
         complete = len(comparison.items) == len(study.techniques) and not comparison.missing
         priorities = ahp.priorities(comparison.matrix) if complete else None
         most = max(points[framing, name] for name in comparison.items) or 1
         result.append(
             {
                 "name": framing,
-                "label": responses.codebook.framing_label(framing),
+                "label": answers.codebook.framing_label(framing),
                 "total": int(totals.total[framing]),
                 "answers": int(totals.answers[framing]),
                 "cr": priorities and priorities.cr,
@@ -105,7 +201,7 @@ def framings(db: Session, study: Study, *, simulated: bool) -> list[dict[str, An
                 "techniques": [
                     {
                         "name": name,
-                        "label": responses.codebook.label(name),
+                        "label": answers.codebook.label(name),
                         "score": int(points[framing, name]),
                         "score_share": float(points[framing, name] / most),
                         "priority": float(priorities.vector[i]) if priorities else None,

@@ -8,6 +8,7 @@ from flask import (
     Blueprint,
     Response,
     abort,
+    current_app,
     flash,
     jsonify,
     redirect,
@@ -82,8 +83,12 @@ def index():
 
 @blueprint.get("/live.json")
 def live_json():
-    """What changes, as numbers and as the piece of the page that shows them."""
+    """What changes, as numbers and as the piece of the page that shows them; nothing where the
+    browser has this `version` already.
+    """
     numbers = _numbers()
+    if request.args.get("version") == numbers["version"]:
+        return "", 204
     return jsonify(**numbers, html=render_template("dashboard/live.html", **numbers))
 
 
@@ -106,6 +111,15 @@ def completions_csv():
     with database().read() as db:
         body = "".join(export.completions_csv(db))
     return _download(body, "completions.csv")
+
+
+@blueprint.get("/participants.csv")
+def participants_csv():
+    """Everybody with their state and the rules that they break."""
+    with database().read() as db:
+        people = live.participants(db, study(), live.responses(db, study()))
+    body = "".join(export.table_csv(list(people[0]) if people else ["code"], people))
+    return _download(body, "participants.csv")
 
 
 @blueprint.post("/completion")
@@ -155,8 +169,8 @@ def report(name: str = "report.html"):
 
 
 def _numbers() -> dict:
-    with database().read() as db:
-        return live.numbers(db, study(), simulated=simulated())
+    period_s = current_app.config.get("LIVE_PERIOD_S", live.PERIOD_S)
+    return live.shared(database(), study(), period_s)
 
 
 def _download(body, name: str) -> Response:

@@ -2,17 +2,21 @@
 
 const PERIOD_MS = 3000;
 const live = document.getElementById("live"), state = document.getElementById("live-state");
-let shown;
+let version = live.dataset.version;
 refresh();
 
 async function refresh() {
   await new Promise((done) => setTimeout(done, PERIOD_MS));
+  if (document.hidden) await new Promise((done) => document.addEventListener("visibilitychange", done, { once: true }));
   try {
-    const response = await fetch(live.dataset.url, { headers: { Accept: "application/json" }, cache: "no-store" });
+    const response = await fetch(`${live.dataset.url}?version=${version}`, { headers: { Accept: "application/json" }, cache: "no-store" });
     if (response.status === 401) return location.reload();
     if (!response.ok) throw new Error(response.statusText);
-    const { html } = await response.json();
-    if (html !== shown) live.innerHTML = shown = html;
+    if (response.status !== 204) {
+      const fresh = await response.json();
+      live.innerHTML = fresh.html;
+      version = fresh.version;
+    }
     say("updates by itself");
   } catch {
     say("connection lost, trying again");

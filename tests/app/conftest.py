@@ -62,7 +62,9 @@ def study_dir(tmp_path, write_study):
 
 @pytest.fixture
 def app(study_dir):
-    return create_app(study_dir)
+    app = create_app(study_dir)
+    app.config["LIVE_PERIOD_S"] = 0  # the dashboard's numbers are made anew at once
+    return app
 
 
 @pytest.fixture

@@ -3,13 +3,15 @@
 import csv
 import io
 import re
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import func, select
 
 from analysis.responses import read_responses
-from app.models import Event, Participant, Response, Trial, now
+from app.dashboard import live
+from app.models import Event, Live, Participant, Response, Trial, now
 
 
 def table(response):
@@ -121,6 +123,54 @@ def test_live_numbers_follow_the_answers(person, experimenter, app):
     assert "1 / 30" in " ".join(after["html"].split())
 
 
+def test_numbers_are_made_once_for_all_who_look(person, experimenter, app, monkeypatch):
+    made, database, study = [], app.extensions["database"], app.extensions["study"]
+    numbers = live.numbers
+    monkeypatch.setattr(live, "numbers", lambda *asked: made.append(1) or numbers(*asked))
+
+    def look(period_s=0.0):
+        return live.shared(database, study, period_s)
+
+    somebody = person().begin().answer(1)
+    with ThreadPoolExecutor(4) as tabs:
+        list(tabs.map(look, [0.0] * 8))
+    seen = look()
+    assert len(made) <= 4 and seen["summary"]["answers"] == 1  # nothing there yet: four may begin
+    made.clear()
+    assert look() == look(1000) == seen and not made  # nothing has happened
+    somebody.answer(2)
+    assert look(1000)["summary"]["answers"] == 2 and len(made) == 1
+    somebody.answer(2)
+    assert look()["summary"]["answers"] == 2 and len(made) == 1  # not before 1000 s have passed
+    with database.write() as db:
+        db.get(Live, 1).next_at = now()
+        db.get(Live, 1).claimed_until = now() + timedelta(minutes=1)
+    assert look()["summary"]["answers"] == 2  # another worker makes them
+    with database.write() as db:
+        db.get(Live, 1).claimed_until = now()  # it was killed
+    assert look()["summary"]["answers"] == 3
+    version = experimenter.get("/dashboard/live.json").json["version"]
+    again = experimenter.get(f"/dashboard/live.json?version={version}")
+    assert (again.status_code, again.data) == (204, b"")
+    assert f'data-version="{version}"' in experimenter.get("/dashboard/").text
+
+
+def test_who_breaks_a_rule_and_where_people_stop(person, experimenter, app):
+    person().begin().answer(*[2] * 30)  # always the same side, and in 1,234 ms
+    person().begin().answer(1, -1)
+    with app.extensions["database"].write() as db:
+        for row in db.scalars(select(Response).where(Response.participant_id == 2)):
+            row.answered_at -= timedelta(hours=1)
+    numbers = experimenter.get("/dashboard/live.json").json
+    flags = {one["code"]: one["flags"] for one in numbers["participants"]}
+    assert "one_side_share" in flags["P0001"] and "same_answer_share" in flags["P0001"]
+    assert "answered_share" in flags["P0002"]
+    assert numbers["stopped"] == [{"answered": 2, "people": 1}]
+    assert "Stopped after 2 answers." in " ".join(numbers["html"].split())
+    rows = table(experimenter.get("/dashboard/participants.csv"))
+    assert [row["flags"] for row in rows] == [flags["P0002"], flags["P0001"]]
+
+
 def test_priorities_appear_when_every_pair_is_answered(person, experimenter):
     """Equal judgements everywhere have equal priorities and a consistency ratio of 0."""
     person().begin().answer(*[0] * 30)
@@ -169,6 +219,7 @@ def test_answers_about_images_that_were_rendered_anew_are_pointed_out(person, ex
     assert experimenter.get("/dashboard/live.json").json["summary"]["about_other_images"] == 0
     with app.extensions["database"].write() as db:
         db.get(Response, 2).image_right_sha256 = "0" * 64
+        db.delete(db.get(Live, 1))  # nothing that the questionnaire does changes an answer
     live = experimenter.get("/dashboard/live.json").json
     assert (
         live["summary"]["about_other_images"] == 1

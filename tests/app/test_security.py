@@ -31,6 +31,7 @@ CLOSED = [
         "",
         "live.json",
         "responses.csv",
+        "participants.csv",
         "completions.csv",
         "codebook.csv",
         "codebook.md",
