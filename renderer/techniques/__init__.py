@@ -11,6 +11,7 @@ from renderer.techniques.borshukov_lewis import BorshukovLewis
 from renderer.techniques.deon_luebke import DeonLuebke
 from renderer.techniques.golubev import Golubev
 from renderer.techniques.golubev_plus import GolubevPlus
+from renderer.techniques.gosselin import Gosselin
 from renderer.techniques.jimenez_gaussian import JimenezGaussian
 from renderer.techniques.jimenez_separable import JimenezSeparable
 from renderer.techniques.none import NoScattering
@@ -23,6 +24,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "golubev": Golubev,
     "golubev_plus": GolubevPlus,
     "borshukov_lewis": BorshukovLewis,
+    "gosselin": Gosselin,
     "deon_luebke": DeonLuebke,
     "splat_dipole": SplatDipole,
 }
