@@ -330,6 +330,7 @@ class Frame:
                 r.surfaces.points,
                 self._shared,
                 self.surface,
+                r.lamps,
             ),
             piece.first,
             self.height,

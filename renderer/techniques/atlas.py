@@ -31,8 +31,8 @@ class Atlas(Drawing):
     """One surface's atlas, and what is drawn over it.
 
     light: irradiance, alpha 1 where the medium scatters; place: position in the world in mm, alpha
-    as there; texel_mm: mm that a texel reaches along u and v. All are (size, size), and given to
-    every pass.
+    as there; texel_mm: mm that a texel reaches along u and v; normal: unit, in the world. All are
+    (size, size), and given to every pass.
     """
 
     def __init__(self, inputs: Inputs, room: Room, drawn: Drawn, size: int):
@@ -44,7 +44,7 @@ class Atlas(Drawing):
         """Irradiance, places and the size of texels."""
         self._refuse_overlap()
         with self.room.placed(self.drawn, "ATLAS", (self.size, self.size)) as lit:
-            irradiance, _, albedo, _, transmitted, position = lit.textures
+            irradiance, _, albedo, normal, transmitted, position = lit.textures
             light = self.target()
             draw_given(
                 self.inputs.context,
@@ -55,9 +55,10 @@ class Atlas(Drawing):
                 texturing,
             )
             self.light = self.given["light"] = light.textures[0]
-            places = self.target(GL.GL_RGBA32F, GL.GL_RGBA16F)
-            self.draw(places, "techniques/atlas_places.glsl", at=position)
-        self.given["place"], self.given["texel_mm"] = places.textures
+            places = self.target(GL.GL_RGBA32F, GL.GL_RGBA16F, GL.GL_RGBA16F)
+            self.draw(places, "techniques/atlas_places.glsl", at=position, facing=normal)
+        for name, texture in zip(("place", "texel_mm", "normal"), places.textures, strict=True):
+            self.given[name] = texture
 
     def mean_texel_mm(self) -> float:
         """The side of a square texel that would cover the surface as often."""
@@ -114,6 +115,10 @@ class AtlasTechnique(Technique):
         """The filtered light: RGBA, alpha 1 where the medium scatters."""
         raise NotImplementedError(f"{self.name} has no filter")
 
+    def with_depths(self) -> bool:
+        """Whether light that comes through by the lamps' depth maps is filtered too."""
+        return self.translucent
+
     def taps(self) -> int:
         """Texture reads that a texel takes."""
         raise NotImplementedError(f"{self.name} does not count")
@@ -131,7 +136,7 @@ class AtlasTechnique(Technique):
     def _one(self, inputs: Inputs, room: Room, drawn: Drawn, target: gl.Target) -> None:
         """Filter one surface's light and draw it where the surface is seen."""
         with Atlas(inputs, room, drawn, self.size) as atlas:
-            atlas.draw_light(self.translucent, self.texturing)
+            atlas.draw_light(self.with_depths(), self.texturing)
             filtered = self.filter(atlas)
             if self.padding:
                 padded = atlas.target()

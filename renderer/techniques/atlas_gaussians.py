@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +22,13 @@ class AtlasGaussians(SumOfGaussians, AtlasTechnique):
     def taps(self) -> int:
         return self.reads()
 
-    def filter(self, atlas: Atlas) -> gl.Texture:
-        blurs, unblurred = self.blurs(self.fit(atlas.inputs.curve))
+    def cascade(
+        self, atlas: Atlas, source: gl.Texture, sigmas: Sequence[float]
+    ) -> Iterator[gl.Texture]:
+        """A texture blurred by each sigma (mm) after the one before.
+
+        What it yields is good until the next but one: two targets are drawn in turn.
+        """
         taps, spacing, _ = self.axis_taps()
         common = {
             "stop": int(self.seams == "stop"),
@@ -31,13 +37,28 @@ class AtlasGaussians(SumOfGaussians, AtlasTechnique):
             "spacing": spacing,
             "reach": len(taps) // 2,
         }
-        row, blurred, total = atlas.target(), atlas.target(), atlas.target()
+        row, *turns = (atlas.target() for _ in range(1 + min(2, len(sigmas))))
+        stretched = [atlas.target(), atlas.target()] if self.stretch == "blurred" else []
+        texel_mm = atlas.given["texel_mm"]
+
+        def blur(source: gl.Texture, into: gl.Target, sigma: float) -> gl.Texture:
+            for axis, target in (((1.0, 0.0), row), ((0.0, 1.0), into)):
+                own = {"source": source, "axis": axis, "sigma": sigma, "texel_mm": texel_mm}
+                atlas.draw(target, "techniques/atlas_gaussian.glsl", **own, **common)
+                source = target.textures[0]
+            return source
+
+        for k, sigma in enumerate(sigmas):
+            source = blur(source, turns[k % 2], sigma)
+            if stretched:
+                texel_mm = blur(texel_mm, stretched[k % 2], sigma)
+            yield source
+
+    def filter(self, atlas: Atlas) -> gl.Texture:
+        blurs, unblurred = self.blurs(self.fit(atlas.inputs.curve))
+        sigmas, weights = zip(*blurs, strict=True)
+        total = atlas.target()
         atlas.draw(total, START, unblurred=unblurred, samples=0.0)
-        source, shader = atlas.light, "techniques/atlas_gaussian.glsl"
-        for sigma, weight in blurs:
-            own = {**common, "sigma": sigma}
-            atlas.draw(row, shader, source=source, axis=(1.0, 0.0), **own)
-            atlas.draw(blurred, shader, source=row.textures[0], axis=(0.0, 1.0), **own)
-            source = blurred.textures[0]
+        for source, weight in zip(self.cascade(atlas, atlas.light, sigmas), weights, strict=True):
             atlas.draw(total, ADD, blend="add", source=source, weight=weight)
         return total.textures[0]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from renderer import gl
+    from renderer.passes.lamps import Lamps
     from renderer.passes.surfaces import Drawn
 
 
@@ -65,7 +66,7 @@ class Room:
     surfaces: those of the medium at hand; medium: its id. placed(drawn, domain, size, mesh,
     point_mm): a surface's light over "ATLAS" or "POINTS", see Renderer.placed. points(drawn, faces,
     weights): a mesh of points on it. camera: the uniforms camera_position, view and projection;
-    depth: the target whose depth buffer holds what is seen.
+    depth: the target whose depth buffer holds what is seen; lamps: with the layers of their maps.
     """
 
     surfaces: tuple[Drawn, ...]
@@ -74,6 +75,7 @@ class Room:
     points: Callable[..., gl.Mesh]
     camera: dict[str, Any]
     depth: gl.Target
+    lamps: Lamps
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Poisson blurs of the light map.
 
 Gosselin 2004, "Real-time skin rendering", Game Developers Conference; Sander, Gosselin and Mitchell
-2004, "Real-time skin rendering on graphics hardware", SIGGRAPH sketches,
-doi:10.1145/1186223.1186408: light is drawn into the texture atlas and blurred there several times
-by the same twelve taps and their middle, all colours alike.
+2004, "Real-time skin rendering on graphics hardware", SIGGRAPH sketches: light is drawn into the
+texture atlas and blurred there several times by the same twelve taps and their middle, all colours
+alike.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Gosselin(AtlasTechnique):
 
     name: ClassVar[str] = "gosselin"
     title: ClassVar[str] = "Gosselin"
-    paper: ClassVar[str] = "Gosselin 2004, GDC; Sander et al. 2004, doi:10.1145/1186223.1186408"
+    paper: ClassVar[str] = "Gosselin 2004, GDC; Sander et al. 2004, SIGGRAPH sketches"
 
     def radius_mm(self, curve: Curve) -> float:
         """Of one pass, for a medium's curve."""

@@ -19,7 +19,8 @@ from tests.renderer.slab import (
 )
 from tests.renderer.test_techniques import SKIN
 
-TECHNIQUE = renderer.make("deon_luebke", {"size": 1024, "texturing": 0.0})
+OPTIONS = {"size": 1024, "texturing": 0.0, "translucent": False}
+TECHNIQUE = renderer.make("deon_luebke", OPTIONS)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def test_constant_light_stays_constant_to_the_silhouette(ball):
     given = lit(ball, lambda place: np.broadcast_to(light, place.shape))
     for technique in (
         TECHNIQUE,
-        renderer.make("deon_luebke", {"size": 256, "padding": 4, "texturing": 0.0}),
+        renderer.make("deon_luebke", {**OPTIONS, "size": 256, "padding": 4}),
     ):
         with technique.scatter(given).target as target:
             got, count = (texture.read().copy() for texture in target.textures)
@@ -95,3 +96,33 @@ def test_overlapping_texture_coordinates_are_refused(monkeypatch):
     ):
         frame.render(TECHNIQUE)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("thickness_mm", [1.0, 3.0])
+def test_a_sheet_lit_from_behind_lets_the_widest_gaussians_through(thickness_mm):
+    """Sum of w exp(-t^2 / 2v) of the last three, as in the chapter's listing; in front, where the
+    lamp shines on the face itself, nothing is added."""
+    technique = renderer.make("deon_luebke", {"size": 256, "texturing": 0.0})
+    for towards, through in (-1.0, 1.0), (1.0, 0.0):
+        table = {
+            "objects": {"sheet": {"shape": "slab", "size_mm": [40.0, 40.0, thickness_mm]}},
+            "materials": {"sheet": {"medium": "deon_luebke"}},
+            "lights": {"sun": {"direction": [0.0, 0.0, towards], "irradiance": [1.0, 1.0, 1.0]}},
+            "environment": {"ambient": [0.0, 0.0, 0.0]},
+            "camera": {"framing": "sheet", "height_mm": 30.0, "angle": "front"},
+        }
+        graph = scenes.stage(scenes.read_scene(table)).graph
+        with renderer.Renderer(graph, (48, 48), 1, rays=8, shadow_map=256) as drawing:
+            with drawing.frame() as frame, technique.scatter(frame.inputs(False)).target as target:
+                got = target.textures[0].read()[24, 24, :3]
+                lit_face = frame.surface.textures[0].read()[24, 24, :3]
+        fit = technique.fit(SKIN)
+        falling = fit.weights * np.exp(-(thickness_mm**2) / (2 * fit.variance_mm2[:, None]))
+        np.testing.assert_allclose(got, lit_face + through * falling[-3:].sum(0), atol=3e-3)
+
+
+def test_a_blurred_stretch_map_is_the_map_itself_where_the_texture_is_even():
+    _, got, _ = surface_edge_response(TECHNIQUE)
+    blurred = renderer.make("deon_luebke", {**TECHNIQUE.plain(), "stretch": "blurred"})
+    _, also, _ = surface_edge_response(blurred)
+    np.testing.assert_allclose(also, got, atol=2e-3)
