@@ -74,7 +74,14 @@ class DeonLuebke(AtlasGaussians):
         source="GPU Gems 3, listing 14-5",
     )
     map_size: int = parameter(
-        1024, unit="pixels a side of a lamp's map", low=64, high=4096, source="by eye"
+        2048, unit="pixels a side of a lamp's map", low=64, high=4096, source="by eye"
+    )
+    shrink_mm: float = parameter(
+        0.5,
+        unit="mm inwards, of a place before it is looked up in a lamp's map",
+        low=0.0,
+        high=10.0,
+        source="Jimenez et al. 2010, sec. 3; 0 in GPU Gems 3, whose maps stripe where light grazes",
     )
 
     name: ClassVar[str] = "deon_luebke"
@@ -113,13 +120,13 @@ class DeonLuebke(AtlasGaussians):
         if not (self.translucent and self.through == "maps" and lamps.layers):
             yield atlas.light, None
             return
-        side, programs = atlas.size, atlas.inputs.programs
+        programs = atlas.inputs.programs
         with ExitStack() as held:
             formats = [GL.GL_RGBA16F, GL.GL_RGBA32F]
-            ways = held.enter_context(gl.Target(side, side, formats, depth=True, linear=True))
+            ways = held.enter_context(gl.Target(atlas.size, atlas.size, formats, True, True))
             ways.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True)
-            formats = [GL.GL_RGBA32F, GL.GL_RGBA16F]
-            seen = held.enter_context(gl.Target(self.map_size, self.map_size, formats, depth=True))
+            formats, side = [GL.GL_RGBA32F, GL.GL_RGBA16F], (self.map_size, self.map_size)
+            seen = held.enter_context(gl.Target(*side, formats, depth=True, linear=True))
             for k, light in enumerate(lamps.lights):
                 point = isinstance(light, PointLight)
                 lamp = np.append(light.place if point else light.towards, float(point))
@@ -141,6 +148,7 @@ class DeonLuebke(AtlasGaussians):
                         layer=layer.matrix,
                         lamp=lamp,
                         falloff=self.falloff,
+                        shrink_mm=self.shrink_mm,
                         lit_mm=LIT_MM,
                     )
                     gl.draw_fullscreen(atlas.inputs.context)
