@@ -16,8 +16,8 @@ from pathlib import Path
 from analysis.errors import InputError
 
 NAME = "manifest.json"
-#: What is read, the newest last; 1 had no factors beside framing.
-FORMATS = ("subdermal-manifest/1", "subdermal-manifest/2")
+#: What is read, the newest last; 1 had no factors beside framing, 2 no viewer.
+FORMATS = tuple(f"subdermal-manifest/{number}" for number in (1, 2, 3))
 #: Measure of an image -> what it is called, with its unit. Less of each is better or cheaper.
 MEASURES = {
     "samples_per_pixel": "samples a scattering pixel",
@@ -137,6 +137,18 @@ def read_region(where: str, value: object) -> tuple[float, float, float, float]:
             "left < right and top < bottom"
         )
     return tuple(map(float, value))
+
+
+def region_box(
+    region: tuple[float, float, float, float], width: int, height: int
+) -> tuple[int, int, int, int]:
+    """A region in whole pixels of an image of that size: left, top, right, bottom, the last two
+    one past its end.
+    """
+    left, top = round(region[0] * width), round(region[1] * height)
+    right, bottom = round(region[2] * width), round(region[3] * height)
+    left, top = min(left, width - 1), min(top, height - 1)
+    return left, top, max(right, left + 1), max(bottom, top + 1)
 
 
 def read_self_rating(where: str, table: Mapping) -> tuple[tuple[str, ...], tuple[int, ...]]:

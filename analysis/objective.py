@@ -19,7 +19,7 @@ from scipy import stats
 from analysis.codebook import FRAMING, Codebook
 from analysis.conclusions import listed
 from analysis.errors import InputError
-from analysis.manifest import MEASURES, ManifestFile, open_manifest
+from analysis.manifest import MEASURES, ManifestFile, open_manifest, region_box
 
 REFERENCE = "reference"
 COLUMNS = ["framing", "technique", "measure", "value", "source"]
@@ -158,10 +158,8 @@ def _pixels(image: _Image) -> np.ndarray:
     except OSError as error:
         raise InputError(f"{image.file}: cannot be read as an image: {error}") from None
     height, width = pixels.shape[:2]
-    left, top, right, bottom = image.region
-    rows = slice(round(top * height), max(round(bottom * height), round(top * height) + 1))
-    columns = slice(round(left * width), max(round(right * width), round(left * width) + 1))
-    return pixels[rows, columns]
+    left, top, right, bottom = region_box(image.region, width, height)
+    return pixels[top:bottom, left:right]
 
 
 def dssim(x: np.ndarray, y: np.ndarray) -> float:

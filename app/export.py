@@ -23,6 +23,8 @@ from app.study import Study
 from stimuli.study import FRAMING
 
 CHUNK_ROWS = 500
+#: A simple reaction to a light takes about this long (Luce 1986, Response Times, ch. 2).
+FASTEST_MS = 200
 
 
 @dataclass(frozen=True)
@@ -228,6 +230,110 @@ COLUMNS = (
             "times device_pixel_ratio it is physical pixels; empty without JavaScript"
         ),
         lambda r: r.response.shown_height,
+    ),
+    Column(
+        "view",
+        "text",
+        "beside, flicker, wipe, unscripted",
+        (
+            "How the pair was looked at when it was answered; unscripted: without JavaScript, side "
+            "by side and scaled by the browser; empty: answered before it was recorded"
+        ),
+        lambda r: r.response.view or "",
+    ),
+    *(
+        Column(
+            f"{view}_ms",
+            "integer",
+            "ms",
+            f"Time of rt_ms that the pair was shown {words}; empty without JavaScript",
+            lambda r, name=f"{view}_ms": getattr(r.response, name),
+        )
+        for view, words in (
+            ("beside", "side by side, or one above the other"),
+            ("flicker", "in one place, to be swapped"),
+            ("wipe", "in one place, with a divider"),
+        )
+    ),
+    Column(
+        "away_ms",
+        "integer",
+        "ms",
+        (
+            "Time of rt_ms that the page was hidden or another window had the keys, which is not "
+            "in the times of the views; empty without JavaScript"
+        ),
+        lambda r: r.response.away_ms,
+    ),
+    Column(
+        "flips",
+        "integer",
+        "from 0",
+        "How often the images were swapped in place; empty without JavaScript",
+        lambda r: r.response.flips,
+    ),
+    Column(
+        "pixel_scale",
+        "number",
+        "screen pixels an image pixel",
+        (
+            "As the question began: 1 is pixel for pixel, a broken number resampled; empty "
+            "without JavaScript"
+        ),
+        lambda r: r.response.pixel_scale,
+    ),
+    Column(
+        "pixel_scale_largest",
+        "number",
+        "screen pixels an image pixel",
+        "The largest that was looked at; empty without JavaScript",
+        lambda r: r.response.pixel_scale_largest,
+    ),
+    Column(
+        "seen_share",
+        "number",
+        "0 to 1",
+        (
+            "Part of the region of interest that was on the screen at once as the question began; "
+            "below 1 the window was too small for it; empty without JavaScript"
+        ),
+        lambda r: r.response.seen_share,
+    ),
+    Column(
+        "rt_server_ms",
+        "integer",
+        "ms",
+        (
+            "Time from first sending the question to receiving the answer by the server's clock: "
+            "more than rt_ms by loading and sending; empty: answered before it was recorded"
+        ),
+        lambda r: r.response.rt_server_ms,
+    ),
+    Column(
+        "rt_reported_ms",
+        "integer",
+        "ms",
+        (
+            "What the browser said where it was more than the server's clock allows; rt_ms is then "
+            "the server's"
+        ),
+        lambda r: r.response.rt_reported_ms,
+    ),
+    Column(
+        "rt_flag",
+        "text",
+        "fast, impossible",
+        (
+            f"fast: rt_ms is below {FASTEST_MS}, less than it takes to see and press; impossible: "
+            "see rt_reported_ms; else empty"
+        ),
+        lambda r: (
+            "impossible"
+            if r.response.rt_reported_ms is not None
+            else "fast"
+            if r.response.rt_ms < FASTEST_MS
+            else ""
+        ),
     ),
 )
 

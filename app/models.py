@@ -164,6 +164,18 @@ class Response(Base):
     device_pixel_ratio: Mapped[float | None]
     shown_width: Mapped[float | None]
     shown_height: Mapped[float | None]
+    # from here on None: answered before it was recorded, or without JavaScript
+    view: Mapped[str | None] = mapped_column(String(10))  # when it was answered
+    beside_ms: Mapped[int | None]
+    flicker_ms: Mapped[int | None]
+    wipe_ms: Mapped[int | None]
+    away_ms: Mapped[int | None]
+    flips: Mapped[int | None]
+    pixel_scale: Mapped[float | None]
+    pixel_scale_largest: Mapped[float | None]
+    seen_share: Mapped[float | None]
+    rt_server_ms: Mapped[int | None]
+    rt_reported_ms: Mapped[int | None]  # where it was more than the server's clock allows
 
     trial: Mapped[Trial] = relationship(back_populates="response")
 

@@ -15,8 +15,14 @@ SECONDS_A_QUESTION = (20, 30)
 #: What app.models stores of a person, in words; tests hold it to the tables.
 RECORDED = (
     "your self-rating, your answers, the times at which you began, answered and ended, how often "
-    "a question was opened, the size of your window and of the images on it, and its scaling"
+    "a question was opened, the size of your window and of the images on it, and its scaling, how "
+    "you looked at each pair (views, zoom, how long), and how long the page was out of sight"
 )
+
+
+def box_name(image: Image) -> str:
+    """The pixels of an image's region of interest, as in its address."""
+    return "-".join(map(str, image.box))
 
 
 @dataclass(frozen=True)
@@ -75,6 +81,11 @@ class Study:
     @cached_property
     def images_by_sha256(self) -> dict[str, Image]:
         return {image.sha256: image for image in self.manifest.images}
+
+    @cached_property
+    def shown(self) -> dict[tuple[str, str], Image]:
+        """By the sha256 and the box in the address of what a question shows of an image."""
+        return {(image.sha256, box_name(image)): image for image in self.manifest.images}
 
     def image(self, cell: str, technique: str) -> Image:
         return self.manifest.image(cell, technique)

@@ -4,9 +4,7 @@ friendly error pages.
 
 from __future__ import annotations
 
-import hashlib
-from functools import lru_cache
-from pathlib import Path
+from typing import NoReturn
 
 from flask import (
     Blueprint,
@@ -18,12 +16,15 @@ from flask import (
     render_template,
     request,
     send_file,
+    url_for,
 )
 from flask_wtf.csrf import CSRFError
 from werkzeug.exceptions import HTTPException
 
+from app import renditions
 from app.database import Database
-from app.study import Study
+from app.study import Study, box_name
+from stimuli.manifest import Image
 
 #: A year: an image's address is the hash of its bytes, so what it names never changes.
 IMMUTABLE = "public, max-age=31536000, immutable"
@@ -56,7 +57,21 @@ def wants_json() -> bool:
 def init(app: Flask) -> None:
     app.register_blueprint(blueprint)
     app.register_error_handler(HTTPException, _error_page)
+    app.add_template_filter(picture)
     app.context_processor(lambda: {"study": study().definition, "simulated": simulated()})
+
+
+def picture(image: Image) -> dict[str, str | int]:
+    """What a page's script needs to fetch and place an image: the address of its region without
+    the width at which it is wanted, and the region's size in image pixels.
+    """
+    left, top, right, bottom = image.box
+    address = url_for("web.shown", sha256=image.sha256, box=box_name(image), width=0)
+    return {
+        "address": address.removesuffix("0"),
+        "width": right - left,
+        "height": bottom - top,
+    }
 
 
 @blueprint.get("/images/<sha256>")
@@ -68,39 +83,53 @@ def image(sha256: str) -> Response:
     if found is None:
         abort(404, "This study has no such image.")
     path = found.path.resolve()
-    if not path.is_file() or _digest(path, path.stat().st_mtime_ns, path.stat().st_size) != sha256:
-        current_app.logger.error("%s was changed or removed after the study was opened", path)
-        abort(404, "The file of this image was changed after the study was opened.")
+    try:
+        renditions.check(path, sha256)
+    except renditions.Changed as error:
+        _gone(error)
     response = send_file(path, mimetype=found.media_type, etag=sha256)
     response.headers["Cache-Control"] = IMMUTABLE
     return response
 
 
-@lru_cache(maxsize=1024)
-def _digest(path: Path, _mtime_ns: int, _size: int) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+@blueprint.get("/images/<sha256>/<box>/<int:width>")
+def shown(sha256: str, box: str, width: int) -> Response:
+    """The region of interest of an image, `width` pixels wide: what a question shows. Its address
+    names the bytes of the image, the region and the size, so that it never changes either.
+    """
+    found = study().shown.get((sha256, box))
+    wanted = found and renditions.Rendition(found, width)
+    if wanted is None or not wanted.offered:
+        abort(404, "This study shows no such image.")
+    # named, not by */*: every browser says the latter
+    webp = any(kind == renditions.WEBP and q > 0 for kind, q in request.accept_mimetypes)
+    try:
+        data, kind = renditions.rendition(wanted, study().directory / renditions.FOLDER, webp=webp)
+    except renditions.Changed as error:
+        _gone(error)
+    response = Response(data, mimetype=kind)
+    response.headers["Cache-Control"] = IMMUTABLE
+    response.headers["Vary"] = "Accept"
+    return response
+
+
+def _gone(error: renditions.Changed) -> NoReturn:
+    current_app.logger.error("%s", error)
+    abort(404, "The file of this image was changed after the study was opened.")
 
 
 @blueprint.get("/study.css")
 def style() -> Response:
-    """What is shown of each cell's images: the aspect ratio of their region of interest and where
-    it lies (the content policy allows no inline styles).
+    """What differs from study to study: the grey around the images, and the aspect ratio of each
+    cell's region of interest (the content policy allows no inline styles).
     """
-    opened = study()
-    rules = []
+    opened, viewer = study(), study().definition.viewer
+    rules = [f":root {{ --surround: rgb({viewer.surround} {viewer.surround} {viewer.surround}); "]
+    rules.append(f"--on-surround: {viewer.ink}; }}\n")
     for place, cell in enumerate(opened.cells):
-        image = opened.image(cell, opened.techniques[0])
-        left, top, right, bottom = image.region
-        width, height = right - left, bottom - top
-        values = {
-            "ratio": f"{image.width * width / (image.height * height):.6f}",
-            "width": f"{100 / width:.4f}%",
-            "left": f"{-100 * left / width:z.4f}%",
-            "top": f"{-100 * top / height:z.4f}%",
-        }
-        listed = " ".join(f"--{name}: {value};" for name, value in values.items())
-        rules.append(f'[data-cell="{place}"] {{ {listed} }}\n')
+        left, top, right, bottom = opened.image(cell, opened.techniques[0]).box
+        ratio = (right - left) / (bottom - top)
+        rules.append(f'[data-cell="{place}"] {{ --ratio: {ratio:.6f}; }}\n')
     response = Response("".join(rules), mimetype="text/css")
     response.headers["Cache-Control"] = "no-cache"
     return response

@@ -8,10 +8,11 @@ import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from analysis.manifest import FORMATS, NAME, WHOLE, ManifestFile, open_manifest
+from analysis.manifest import FORMATS, NAME, WHOLE, ManifestFile, open_manifest, region_box
 from stimuli.errors import InputError
 from stimuli.study import FRAMING, Cell, Study, read_study
 from stimuli.table import Table
+from stimuli.viewing import FIT, ONE_TO_ONE
 
 FORMAT = FORMATS[-1]
 _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
@@ -48,6 +49,11 @@ class Image:
         return self.levels[FRAMING]
 
     @property
+    def box(self) -> tuple[int, int, int, int]:
+        """The region of interest in whole pixels of the image: left, top, right, bottom."""
+        return region_box(self.region, self.width, self.height)
+
+    @property
     def media_type(self) -> str:
         """As in an HTTP header, from the file's ending."""
         return _MEDIA[self.path.suffix.lower()]
@@ -78,9 +84,10 @@ def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
     file = open_manifest(directory / NAME)
     value = dict(file.value)
     table = Table(value, str(file.path))
-    table.one_of("format", FORMATS)
+    # before format 3 a study could not say how its images are shown: they fitted the window
+    display = FIT if table.one_of("format", FORMATS) in FORMATS[:2] else ONE_TO_ONE
     study_table = table.table("study")
-    study = read_study(study_table)
+    study = read_study(study_table, display=display)
     study_table.end()
     entries = table.tables("images", least=1)
     for entry in entries:

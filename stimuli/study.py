@@ -20,6 +20,7 @@ from stimuli.errors import InputError
 from stimuli.parts import read_toml
 from stimuli.scenes import load_table, merge
 from stimuli.table import Table, refuse_doubles
+from stimuli.viewing import ONE_TO_ONE, Viewer, read_viewer
 
 THESIS = Path(__file__).parent / "studies" / "thesis.toml"
 FRAMING = "framing"
@@ -46,6 +47,18 @@ RESERVED = frozenset(
         "device_pixel_ratio",
         "shown_width",
         "shown_height",
+        "view",
+        "beside_ms",
+        "flicker_ms",
+        "wipe_ms",
+        "flips",
+        "pixel_scale",
+        "pixel_scale_largest",
+        "seen_share",
+        "away_ms",
+        "rt_server_ms",
+        "rt_reported_ms",
+        "rt_flag",
     }
 )
 #: What a consent text may say in braces; the page fills it in from what is asked and stored.
@@ -158,7 +171,7 @@ class Study:
 
     factors: framing first; cells: the combinations of their levels that are shown. `render` and
     `scene` (the table of the scene that levels patch) are None where the images are ready-made;
-    `analysis` is what it declares of its analysis.
+    `analysis` is what it declares of its analysis; `viewer` is how pairs are looked at.
     """
 
     name: str
@@ -175,6 +188,7 @@ class Study:
     render: Render | None = None
     scene: dict | None = None
     analysis: dict = field(default_factory=dict)
+    viewer: Viewer = Viewer()
 
     @property
     def framings(self) -> tuple[Level, ...]:
@@ -240,6 +254,7 @@ class Study:
                 "levels": list(self.familiarity.levels),
             },
             "consent": self.consent,
+            "viewer": self.viewer.record(),
             **({"analysis": self.analysis} if self.analysis else {}),
         }
 
@@ -284,9 +299,14 @@ def with_head(scene: dict, name: str, unit: str | None = None, up: str | None = 
     return {**scene, "objects": objects}
 
 
-def read_study(table: Table, render: Render | None = None, scene: dict | None = None) -> Study:
+def read_study(
+    table: Table,
+    render: Render | None = None,
+    scene: dict | None = None,
+    display: str = ONE_TO_ONE,
+) -> Study:
     """The study in a table of a TOML file or of a manifest; without `render`, images are
-    ready-made.
+    ready-made. display: of a study that says nothing of it.
     """
     default = _defaults() if render is not None else {**_defaults(), "consent": CONSENT}
     wording = Table({**default, **table.value}, table.source, table.key)
@@ -307,6 +327,7 @@ def read_study(table: Table, render: Render | None = None, scene: dict | None = 
         render=render,
         scene=scene,
         analysis=_analysis(table),
+        viewer=read_viewer(table.table("viewer", default={}), display),
     )
     refuse_doubles(techniques, "name")
     refuse_doubles(techniques, "label")

@@ -19,7 +19,14 @@ MAY_IMPORT = {
         "analysis.files",
         "analysis.manifest",
     },
-    "app": {"analysis", "stimuli.design", "stimuli.errors", "stimuli.manifest", "stimuli.study"},
+    "app": {
+        "analysis",
+        "stimuli.design",
+        "stimuli.errors",
+        "stimuli.manifest",
+        "stimuli.study",
+        "stimuli.viewing",
+    },
 }
 PROFILE_VERBS = {
     "profile",

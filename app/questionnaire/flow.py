@@ -24,6 +24,8 @@ from app.study import Study
 #: No letters or digits that look alike; 10 of them are 48 bits.
 CODE_ALPHABET = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 CODE_LENGTH = 10
+#: So much longer than by the server's clock a browser's may say that an answer took.
+CLOCKS_APART_MS = 1000
 
 
 class Outcome(Enum):
@@ -50,6 +52,15 @@ class Answer:
     device_pixel_ratio: float | None = None
     shown_width: float | None = None
     shown_height: float | None = None
+    view: str | None = None
+    beside_ms: int | None = None
+    flicker_ms: int | None = None
+    wipe_ms: int | None = None
+    away_ms: int | None = None
+    flips: int | None = None
+    pixel_scale: float | None = None
+    pixel_scale_largest: float | None = None
+    seen_share: float | None = None
 
 
 def find(session: Session, visit: str | None, *, lock: bool = False) -> Participant | None:
@@ -151,21 +162,29 @@ class Shown:
 
 
 def answer(
-    database: Database, study: Study, visit: str, trial_id: int, given: Answer, shown: Shown | None
+    database: Database,
+    study: Study,
+    visit: str,
+    trial_id: int,
+    given: Answer,
+    shown: Shown | None,
+    *,
+    bound: bool = True,
 ) -> tuple[Outcome, Standing] | None:
     """Commit an answer to the current trial; anything else changes nothing. Gives how far the
     participant is then; None where the visit has not begun.
 
     shown: what this browser's cookie says. The hashes of the images prove that the question was
-    shown; a browser that lost its cookie meanwhile has no time but its own.
+    shown; a browser that lost its cookie meanwhile has no time but its own. bound: whether the
+    browser's time is held to the server's; programs need no time to answer.
     """
     try:
         with database.append() as connection:
-            return _answer(connection, study, visit, trial_id, given, shown)
+            return _answer(connection, study, visit, trial_id, given, shown, bound)
     except IntegrityError:
         # the same click a moment earlier: it has an answer now
         with database.append() as connection:
-            return _answer(connection, study, visit, trial_id, given, shown)
+            return _answer(connection, study, visit, trial_id, given, shown, bound)
 
 
 def _answer(
@@ -175,6 +194,7 @@ def _answer(
     trial_id: int,
     given: Answer,
     shown: Shown | None,
+    bound: bool,
 ) -> tuple[Outcome, Standing] | None:
     asked = connection.execute(_ASKED, {"trial": trial_id, "visit": visit}).one_or_none()
     if asked is None:
@@ -210,12 +230,19 @@ def _answer(
         began = answered_at - timedelta(milliseconds=given.rt_ms or 0)
         shown = Shown(trial_id, max(began, asked.consented_at), 1)
     by_server = round((answered_at - shown.at).total_seconds() * 1000)
+    rt_ms, reported = given.rt_ms, None
+    if rt_ms is None:
+        rt_ms = by_server
+    elif bound and rt_ms > by_server + CLOCKS_APART_MS:  # longer than the question has been there
+        rt_ms, reported = by_server, rt_ms
     row = {
         "participant_id": asked.id,
         "trial_id": trial_id,
         "answer": given.value,
-        "rt_ms": by_server if given.rt_ms is None else given.rt_ms,
-        "timed_by": "server" if given.rt_ms is None else "browser",
+        "rt_ms": rt_ms,
+        "timed_by": "browser" if given.rt_ms is not None and reported is None else "server",
+        "rt_server_ms": by_server,
+        "rt_reported_ms": reported,
         "times_shown": shown.times,
         "started_at": shown.at,
         "answered_at": answered_at,

@@ -22,18 +22,39 @@ from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
 from app.models import Participant
-from app.questionnaire import flow
+from app.questionnaire import flow, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
 from app.security import Limiter
 from app.web import database, simulated, study, wants_json
+from stimuli.manifest import Image
+from stimuli.viewing import REQUIRED
 
 blueprint = Blueprint("questionnaire", __name__)
 _code_attempts = Limiter(attempts=10, window_s=300)
 
 _LARGEST_RT_MS = 2**31 - 1
 _LARGEST_SIZE = 100_000
-#: How many questions ahead the page fetches images.
-PRELOADED_QUESTIONS = 1
+#: How many questions ahead a page fetches images.
+PRELOADED_QUESTIONS = 5
+#: The view of a browser without scripts.
+UNSCRIPTED = "unscripted"
+#: What the page's script measures and sends with an answer: how each is read.
+_MEASURED = {
+    **dict.fromkeys(("viewport_width", "viewport_height"), (int, 1, _LARGEST_SIZE)),
+    **dict.fromkeys(("shown_width", "shown_height"), (float, 0, _LARGEST_SIZE)),
+    "device_pixel_ratio": (float, 0, 100),
+    **dict.fromkeys(
+        ("rt_ms", "beside_ms", "flicker_ms", "wipe_ms", "away_ms", "flips"),
+        (int, 0, _LARGEST_RT_MS),
+    ),
+    **dict.fromkeys(("pixel_scale", "pixel_scale_largest"), (float, 0, 1000)),
+    "seen_share": (float, 0, 1),
+}
+
+
+@blueprint.context_processor
+def _wording() -> dict:
+    return {"words": wording.QUESTION, "mode_names": wording.MODES}
 
 
 @blueprint.get("/")
@@ -47,7 +68,14 @@ def welcome():
                     return render_template("questionnaire/simulated.html")
                 session["visit"] = secrets.token_urlsafe(16)
                 session.permanent = True
-            return render_template("questionnaire/consent.html", paragraphs=study().consent)
+            return render_template(
+                "questionnaire/consent.html",
+                paragraphs=study().consent,
+                # in no order that says anything: which are asked first is not drawn yet
+                upcoming=sorted(study().manifest.images, key=lambda image: image.sha256)[
+                    : 2 * PRELOADED_QUESTIONS
+                ],
+            )
         place = _place(participant)
         if place in ("questionnaire.thanks", "questionnaire.withdrawn"):
             return redirect(url_for(place))
@@ -75,7 +103,11 @@ def familiarity():
         participant = _participant(db)
         if redirection := _redirect_to_due(participant):
             return redirection
-        return render_template("questionnaire/familiarity.html", participant=participant)
+        return render_template(
+            "questionnaire/familiarity.html",
+            participant=participant,
+            upcoming=_of(flow.upcoming(db, participant, PRELOADED_QUESTIONS)),
+        )
 
 
 @blueprint.post("/familiarity")
@@ -108,7 +140,8 @@ def question():
         trial=trial,
         cell=study().cells.index(trial.cell),
         images=_images(trial),
-        upcoming=[image for one in following for image in _images(one)],
+        upcoming=_of(following),
+        measured=["view", *_MEASURED],
     )
 
 
@@ -124,17 +157,19 @@ def answer():
         return redirect(url_for(".question"), 303)
     given = Answer(
         value=value,
-        rt_ms=_integer("rt_ms", 0, _LARGEST_RT_MS),
         image_left_sha256=request.form.get("image_left", ""),
         image_right_sha256=request.form.get("image_right", ""),
-        viewport_width=_integer("viewport_width", 1, _LARGEST_SIZE),
-        viewport_height=_integer("viewport_height", 1, _LARGEST_SIZE),
-        device_pixel_ratio=_number("device_pixel_ratio", 100),
-        shown_width=_number("shown_width", _LARGEST_SIZE),
-        shown_height=_number("shown_height", _LARGEST_SIZE),
+        view=_view(),
+        **{
+            name: (_integer if kind is int else _number)(name, low, high)
+            for name, (kind, low, high) in _MEASURED.items()
+        },
     )
+    if given.view == UNSCRIPTED and study().definition.viewer.scripts == REQUIRED:
+        abort(400, "This study shows images by JavaScript, which is switched off or was kept away.")
     shown = flow.Shown.of_cookie(session.get("shown"))
-    said = flow.answer(database(), study(), session.get("visit", ""), trial, given, shown)
+    visit, bound = session.get("visit", ""), not simulated()
+    said = flow.answer(database(), study(), visit, trial, given, shown, bound=bound)
     if said is None:
         abort(400, "This browser has not begun the questionnaire.")
     outcome, here = said
@@ -230,9 +265,23 @@ def _redirect_to_due(participant: Participant | None):
     return None if place == request.endpoint else redirect(url_for(place), 303)
 
 
-def _images(trial: Row):
+def _of(trials: list[Row]) -> list[Image]:
+    """The images of trials, each once, in the order in which they are shown."""
+    images = [image for one in trials for image in _images(one)]
+    return list({(image.sha256, image.box): image for image in images}.values())
+
+
+def _images(trial: Row) -> list[Image]:
     """The left and right image of a trial."""
     return [study().image(trial.cell, side) for side in (trial.left, trial.right)]
+
+
+def _view() -> str | None:
+    """The view in which an answer was given; a browser without scripts names none and no time."""
+    modes, named = study().definition.viewer.modes, request.form.get("view", "")
+    if not named and not request.form.get("rt_ms"):
+        return UNSCRIPTED
+    return named if named in modes else None
 
 
 def _integer(name: str, low: int, high: int) -> int | None:
@@ -246,9 +295,9 @@ def _integer(name: str, low: int, high: int) -> int | None:
     return value if low <= value <= high else None
 
 
-def _number(name: str, high: float) -> float | None:
+def _number(name: str, low: float, high: float) -> float | None:
     try:
         value = float(request.form.get(name, ""))
     except ValueError:
         return None
-    return value if 0 < value <= high else None
+    return value if low < value <= high else None

@@ -24,6 +24,7 @@ WINDOW = {
     "device_pixel_ratio": 1,
     "shown_width": 955.5,
     "shown_height": 537.47,
+    "view": "beside",
 }
 
 

@@ -327,7 +327,7 @@ def test_a_study_gives_order_and_labels_and_finds_strangers(tmp_path, write, ans
         (b"{", "not JSON"),
         (b"[]", "format is 'list'"),
         (b"{}", "format is None"),
-        (b'{"format": "subdermal-manifest/3"}', "format is 'subdermal-manifest/3'"),
+        (b'{"format": "subdermal-manifest/9"}', "format is 'subdermal-manifest/9'"),
         (b'{"format": "subdermal-manifest/1"}', "study is None"),
         (b'{"format": "subdermal-manifest/1", "study": {"framings": []}}', "study.framings is"),
         (

@@ -125,7 +125,7 @@ class Person:
 
     def answer(self, *values: int) -> Person:
         for value in values:
-            self.send("trial", answer=value, rt_ms=1234)
+            self.send("trial", answer=value, rt_ms=321)
         return self
 
     @property

@@ -2,7 +2,6 @@
 of every size.
 """
 
-import base64
 import hashlib
 import io
 import json
@@ -117,7 +116,7 @@ def test_all_thirty_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_conne
             page.keyboard.press("Enter")
         else:
             page.click(f"label:has(input[name=answer][value='{answer}'])")
-            page.click("text=Confirm")
+            page.click("button:text('Confirm')")
     expect(page.locator("#completion-code")).to_have_text(re.compile("^[A-Z2-9]{10}$"))
 
     rows = stored(app)
@@ -186,7 +185,7 @@ def test_an_answer_whose_acknowledgement_was_lost_is_one_answer(page, address, a
 def test_back_and_double_click_change_nothing(page, address, app):
     begin(page, address)
     page.keyboard.press("2")
-    page.dblclick("text=Confirm")
+    page.dblclick("button:text('Confirm')")
     shown(page, 2)
     page.keyboard.press("1")
     page.keyboard.press("Enter")
@@ -217,45 +216,60 @@ def test_arrows_and_focus(page, address):
 
 
 def test_nothing_can_be_answered_before_both_images_are_there(page, address, app):
-    held = []
-    page.route("**/images/*", lambda route: held.append(route) if not held else route.continue_())
+    held = {}
+    page.route("**/images/**", lambda route: held.setdefault(route.request.url, route))
     page.goto(address)
     page.check("[name=consent]")
     page.click("text=Begin")
     page.get_by_label("Some familiarity").check()
     page.click("text=Continue")
     page.wait_for_selector("html.ready fieldset:disabled")
-    page.wait_for_timeout(500)
-    assert page.evaluate(
-        "[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)"
-    ) == ["0", "0"]
+    expect(page.locator(".wait")).to_be_visible()
     page.keyboard.press("5")
     page.keyboard.press("Enter")
-    held[0].continue_()
+    second = json.loads(page.locator("main").get_attribute("data-images"))[1]["address"]
+    page.wait_for_timeout(300)
+    last = [held.pop(url) for url in list(held) if second in url]
+    assert last
+    for route in held.values():
+        route.continue_()
+    page.wait_for_timeout(300)
+    expect(page.locator(".wait")).to_be_visible()
+    assert page.locator("main.shown").count() == 0
+    for route in last:
+        route.continue_()
+    page.unroute("**/images/**")
     shown(page, 1)
-    assert page.evaluate(
-        "[...document.querySelectorAll('.pair img')].map((i) => getComputedStyle(i).opacity)"
-    ) == ["1", "1"]
+    expect(page.locator(".wait")).to_be_hidden()
     assert page.locator("input[name=answer]:checked").count() == 0 and stored(app) == []
 
 
-def test_the_next_images_are_there_before_they_are_asked_for(page, address):
-    begin(page, address)
-    page.wait_for_timeout(500)
-    upcoming = page.locator("main").get_attribute("data-upcoming").split()
-    page.keyboard.press("3")
-    page.keyboard.press("Enter")
-    shown(page, 2)
-    images = page.evaluate(
-        "[...document.querySelectorAll('.pair img')].map((i) => i.getAttribute('src'))"
-    )
-    assert images == upcoming
-    loaded = page.evaluate(
-        "performance.getEntriesByType('resource').map((e) => [e.name, e.transferSize])"
-    )
-    fetched = [name for name, size in loaded if "/images/" in name and size]
-    assert len(fetched) >= 4
-    assert len(fetched) == len(set(fetched))  # no image came over the network twice
+def test_images_are_there_before_they_are_asked_for(page, address, app):
+    """From the consent page on, and none comes over the network twice."""
+    sent, inner = [], app.wsgi_app
+
+    def counting(environ, start_response):
+        sent.append(environ["PATH_INFO"])
+        return inner(environ, start_response)
+
+    app.wsgi_app = counting
+    page.goto(address)
+    page.wait_for_load_state("networkidle")
+    page.check("[name=consent]")
+    page.click("text=Begin")
+    page.get_by_label("Some familiarity").check()
+    page.click("text=Continue")
+    upcoming = []
+    for number in (1, 2, 3):
+        shown(page, number)
+        images = json.loads(page.locator("main").get_attribute("data-images"))
+        assert number == 1 or all(image in upcoming for image in images)
+        upcoming = json.loads(page.locator("main").get_attribute("data-upcoming"))
+        page.wait_for_timeout(300)
+        page.keyboard.press("3")
+        page.keyboard.press("Enter")
+    images = [path for path in sent if path.startswith("/images/")]
+    assert 10 <= len(images) == len(set(images)) <= 15
 
 
 def test_without_scripts_the_whole_questionnaire_works(chromium, address, app):
@@ -271,7 +285,7 @@ def test_without_scripts_the_whole_questionnaire_works(chromium, address, app):
         for number in range(1, 31):
             expect(page.locator("h1")).to_have_text(re.compile(rf"Question {number}\s"))
             page.get_by_label("A, slightly").check()
-            page.click("text=Confirm")
+            page.click("button:text('Confirm')")
         expect(page.locator("#completion-code")).to_be_visible()
     assert [r.answer for _, r in stored(app)] == [-1] * 30
 
@@ -293,12 +307,13 @@ def test_images_are_as_large_as_the_window_allows(page, address, width, height, 
     """960 x 540 is 1920 x 1080 at 200 % zoom; phones stand and lie."""
     page.set_viewport_size({"width": width, "height": height})
     begin(page, address)
-    a, b = (page.locator(".pair img").nth(i).bounding_box() for i in (0, 1))
+    a, b = (page.locator(".pair canvas").nth(i).bounding_box() for i in (0, 1))
     assert (a["y"] == b["y"]) == beside and (a["x"] == b["x"]) != beside
     assert a["width"] == b["width"] and abs(a["width"] / a["height"] - 16 / 9) < 0.02
     room = page.locator(".pair").bounding_box()
     across, down = (width / 2, room["height"]) if beside else (width, room["height"] / 2)
-    assert a["width"] > min(across - 8, (down - 28) * 16 / 9)  # but for the gap and the labels
+    # but for the gap, the labels, and the steps of 16 pixels
+    assert a["width"] > min(across - 8, (down - 28) * 16 / 9) - 16
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert page.evaluate("document.documentElement.scrollHeight <= innerHeight + 1")
     for label in page.locator(".options label").all():
@@ -309,41 +324,151 @@ def test_images_are_as_large_as_the_window_allows(page, address, width, height, 
 
 @pytest.mark.parametrize(
     ("width", "height", "ratio"),
-    [(1920, 1080, 1), (1281, 723, 1), (1366, 768, 1.25), (1707, 961, 1.1)]
-    + [(390, 844, 3), (412, 915, 2.625)],
+    [(1281, 723, 1), (1707, 961, 1.1), (1366, 768, 1.25), (390, 844, 3), (412, 915, 2.625)],
 )
-def test_one_file_is_drawn_alike_on_both_sides(study_dir, chromium, width, height, ratio):
-    """Byte for byte on the screen, at every window and pixel ratio, in both layouts; and the screen
-    shows the pixels of the page's canvas, scaled by nobody. The ratio is the browser's own: that
-    of an emulated screen scales what was drawn at 1.
+def test_one_file_is_drawn_alike_on_both_sides(noise_study, chromium, width, height, ratio):
+    """Byte for byte on the screen, in every view, at every window and pixel ratio, side by side and
+    one above the other; and the screen shows the pixels of the file, scaled by nobody: 1:1 those of
+    its region, 2:1 each as two by two, fitted those of the server's one resampling. The ratio is
+    the browser's own: that of an emulated screen scales what was drawn at 1.
     """
-    manifest = json.loads((study_dir / "manifest.json").read_text())
-    noise = np.random.default_rng(0).integers(0, 256, (540, 960, 3)).astype(np.uint8)
-    for one in manifest["images"]:
-        Image.fromarray(noise).save(study_dir / one["file"])
-        one["sha256"] = hashlib.sha256((study_dir / one["file"]).read_bytes()).hexdigest()
-    (study_dir / "manifest.json").write_text(json.dumps(manifest))
     flags = [f"--force-device-scale-factor={ratio}", f"--window-size={width},{height}"]
     launch = chromium.browser_type.launch
+    exact, fitted = noise_study("exact"), noise_study("fit", display="fit")
+    with Image.open(next((exact / "images").glob("*.png"))) as file:
+        noise = np.asarray(file)[108:432, 96:864]  # of the region [0.1, 0.2, 0.9, 0.8]
     with (
-        running(create_app(study_dir)) as address,
+        running(create_app(exact)) as address,
+        running(create_app(fitted)) as fitted_address,
         launch(executable_path=chromium_path(), args=[*FLAGS, *flags]) as browser,
         browser.new_context(no_viewport=True) as context,
     ):
         page = context.new_page()
         begin(page, address)
         assert page.evaluate("devicePixelRatio") == pytest.approx(ratio, abs=1e-6)
-        screen = picture(page.screenshot())
-        canvases = page.locator(".pair canvas")
-        boxes = [canvases.nth(k).bounding_box() for k in (0, 1)]
-        drawn = canvases.first.evaluate("(canvas) => canvas.toDataURL('image/png')")
-    left, right = (
-        screen[slice(*edges(box, "y", "height", ratio)), slice(*edges(box, "x", "width", ratio))]
-        for box in boxes
+        for times in (1, 2):
+            blocks = np.kron(noise, np.ones((times, times, 1), np.uint8))
+            for view, sides in (("beside", 2), ("flicker", 1), ("wipe", 1)):
+                page.click(f"[data-mode={view}]")
+                expect(page.locator(".badge")).to_have_text(f"{times}:1")
+                drawn = on_screen(page, ratio)
+                assert len(drawn) == sides
+                for one in drawn:
+                    np.testing.assert_array_equal(one, middle(blocks, one.shape))
+                if view == "flicker":
+                    page.keyboard.down("f")
+                    expect(page.locator("figcaption").first).to_have_text("B")
+                    np.testing.assert_array_equal(on_screen(page, ratio)[0], drawn[0])
+                    page.keyboard.up("f")
+            page.click("[data-mode=beside]")
+            page.keyboard.press("+")
+        begin(page, fitted_address)
+        drawn = on_screen(page, ratio)
+        np.testing.assert_array_equal(*drawn)
+        address = json.loads(page.locator("main").get_attribute("data-images"))[0]["address"]
+        sent = page.request.get(f"{fitted_address[:-1]}{address}{drawn[0].shape[1]}")
+        np.testing.assert_array_equal(drawn[0], picture(sent.body()))
+
+
+@pytest.fixture
+def noise_study(tmp_path, write_study):
+    """Studies in which every image is the same noise, 960 x 540, with a region."""
+
+    def write(name, **viewer):
+        directory = write_study(tmp_path / name, size=(960, 540), viewer=viewer)
+        manifest = json.loads((directory / "manifest.json").read_text())
+        manifest["format"] = "subdermal-manifest/3"
+        noise = np.random.default_rng(0).integers(0, 256, (540, 960, 3)).astype(np.uint8)
+        for one in manifest["images"]:
+            Image.fromarray(noise).save(directory / one["file"])
+            one["sha256"] = hashlib.sha256((directory / one["file"]).read_bytes()).hexdigest()
+            one["region"] = [0.1, 0.2, 0.9, 0.8]
+        (directory / "manifest.json").write_text(json.dumps(manifest))
+        return directory
+
+    return write
+
+
+def on_screen(page, ratio):
+    """What a screenshot has where the canvases stand."""
+    page.wait_for_selector(".pair:not(.loading)")
+    screen, found = picture(page.screenshot()), []
+    for canvas in page.locator(".pair canvas").all():
+        if box := canvas.bounding_box():
+            rows, columns = (
+                slice(*edges(box, *names, ratio)) for names in (("y", "height"), ("x", "width"))
+            )
+            found.append(screen[rows, columns])
+    return found
+
+
+def middle(pixels, shape):
+    """The middle part of an image, of that height and width."""
+    top, left = ((pixels.shape[k] - shape[k] + 1) // 2 for k in (0, 1))
+    assert top >= 0 and left >= 0
+    return pixels[top : top + shape[0], left : left + shape[1]]
+
+
+def test_no_frame_is_blank_while_images_are_swapped_and_it_is_recorded(page, address, app):
+    begin(page, address)
+    page.keyboard.press("v")
+    expect(page.locator("[data-mode=flicker]")).to_have_attribute("aria-pressed", "true")
+    page.wait_for_selector(".pair:not(.loading)")
+    colours = page.evaluate(
+        """async () => {
+        const canvas = document.querySelector(".pair canvas"), seen = [];
+        const reader = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+        for (let k = 0; k < 20; k += 1) {
+          document.dispatchEvent(new KeyboardEvent(k % 2 ? "keyup" : "keydown", { key: "f" }));
+          await new Promise(requestAnimationFrame);
+          reader.drawImage(canvas, 0, 0, 1, 1);
+          const { data } = reader.getImageData(0, 0, 1, 1);
+          seen.push([...data].join());
+        }
+        return seen;
+      }"""
     )
-    assert left.std() > 10
-    np.testing.assert_array_equal(left, right)
-    np.testing.assert_array_equal(left, picture(base64.b64decode(drawn.partition(",")[2])))
+    assert len(set(colours[::2])) == len(set(colours[1::2])) == 1 and colours[0] != colours[1]
+    page.evaluate("document.hasFocus = () => false; window.dispatchEvent(new Event('blur'))")
+    page.wait_for_timeout(200)
+    page.evaluate("delete document.hasFocus; window.dispatchEvent(new Event('focus'))")
+    page.keyboard.press("1")
+    page.keyboard.press("Enter")
+    shown(page, 2)
+    ((_, row),) = stored(app)
+    assert (row.view, row.flips, row.wipe_ms) == ("flicker", 20, 0)
+    assert row.away_ms >= 200 and row.beside_ms > 0 and row.flicker_ms > 0
+    assert abs(row.beside_ms + row.flicker_ms + row.away_ms - row.rt_ms) <= 3
+    assert 0 < row.pixel_scale < row.pixel_scale_largest and row.seen_share == 1
+
+
+def test_both_images_zoom_and_move_together(noise_study, chromium):
+    with (
+        running(create_app(noise_study("exact", surround=40))) as address,
+        chromium.new_context(viewport={"width": 900, "height": 700}) as context,
+    ):
+        page = context.new_page()
+        begin(page, address)
+        assert picture(page.screenshot())[350, 2].tolist() == [40, 40, 40]
+        canvas = page.locator(".pair canvas").first
+        before = on_screen(page, 1)
+        box = canvas.bounding_box()
+        page.mouse.move(box["x"] + 50, box["y"] + 60)
+        page.mouse.wheel(0, -100)  # keeps what is under the pointer
+        expect(page.locator(".badge")).to_have_text("2:1")
+        larger = on_screen(page, 1)
+        np.testing.assert_array_equal(*larger)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 20, box["y"] + 40)
+        page.mouse.up()
+        moved = on_screen(page, 1)
+        np.testing.assert_array_equal(*moved)
+        np.testing.assert_array_equal(moved[0][:-20, :-30], larger[0][20:, 30:])
+        page.keyboard.press("Shift+ArrowRight")
+        assert not np.array_equal(on_screen(page, 1)[0], moved[0])
+        page.keyboard.press("0")
+        expect(page.locator(".badge")).to_have_text("1:1")
+        assert on_screen(page, 1)[0].shape == before[0].shape
 
 
 def picture(png):
@@ -374,22 +499,3 @@ def test_the_simulated_study_is_marked(page, study_dir):
         page.goto(address)
         expect(page.locator(".simulated")).to_be_visible()
         assert page.title().startswith("SIMULATED")
-
-
-def test_only_the_region_of_interest_is_shown(study_dir, chromium):
-    """The right half of each image fills its frame; the rest is there and cut off."""
-    manifest = json.loads((study_dir / "manifest.json").read_text())
-    for framing in manifest["study"]["framings"]:
-        framing["region"] = [0.5, 0.25, 1, 0.75]
-    (study_dir / "manifest.json").write_text(json.dumps(manifest))
-    with running(create_app(study_dir)) as address:
-        with chromium.new_context(viewport={"width": 1280, "height": 720}) as context:
-            page = context.new_page()
-            begin(page, address)
-            frame, image = page.locator(".region").first, page.locator(".pair img").first
-            shown, whole = frame.bounding_box(), image.bounding_box()
-            assert shown["width"] / shown["height"] == pytest.approx(960 / 540, rel=0.01)
-            assert whole["width"] == pytest.approx(2 * shown["width"], rel=0.01)
-            assert whole["height"] == pytest.approx(2 * shown["height"], rel=0.01)
-            assert whole["x"] == pytest.approx(shown["x"] - shown["width"], abs=1)
-            assert whole["y"] == pytest.approx(shown["y"] - shown["height"] / 2, abs=1)

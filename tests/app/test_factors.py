@@ -90,7 +90,7 @@ def table(folder):
 
 
 def test_the_page_shows_the_region_of_each_cell(folder, tmp_path):
-    """The style sheet crops each cell's images to their region, in percent of what is shown."""
+    """Each cell's images are sent cut to their region."""
     import shutil
 
     copy = tmp_path / "regions"
@@ -101,12 +101,15 @@ def test_the_page_shows_the_region_of_each_cell(folder, tmp_path):
             image["region"] = [0.25, 0.5, 0.75, 1]
     (copy / "manifest.json").write_text(json.dumps(manifest))
     app = create_app(copy)
-    rules = app.test_client().get("/study.css").text.splitlines()
-    whole = "--ratio: 1.000000; --width: 100.0000%; --left: 0.0000%; --top: 0.0000%;"
-    assert rules[0] == f'[data-cell="0"] {{ {whole} }}'
-    part = "--ratio: 1.000000; --width: 200.0000%; --left: -50.0000%; --top: -100.0000%;"
-    assert rules[1] == f'[data-cell="1"] {{ {part} }}'
-    assert len(rules) == len(app.extensions["study"].cells) == 4
+    root, *rules = app.test_client().get("/study.css").text.splitlines()
+    assert root == ":root { --surround: rgb(108 108 108); --on-surround: #fff; }"
+    study = app.extensions["study"]
+    boxes = [study.image(cell, study.techniques[0]).box for cell in study.cells]
+    (width, height) = boxes[0][2:]
+    assert boxes[0][:2] == (0, 0)
+    assert boxes[1] == (width // 4, height // 2, width * 3 // 4, height)
+    assert rules[1] == f'[data-cell="1"] {{ --ratio: {width / height:.6f}; }}'
+    assert len(rules) == len(study.cells) == 4
 
 
 def test_every_answer_is_used_by_each_factor(folder, table):

@@ -7,8 +7,10 @@ import pytest
 from sqlalchemy import select
 from sqlalchemy.event import listen
 
+from app import create_app
 from app.models import Event, Participant, Trial
 from stimuli.design import trials
+from tests.app.conftest import Person
 
 
 def test_thirty_answers_from_consent_to_code(person):
@@ -44,7 +46,7 @@ def test_the_page_does_not_tell_which_technique_is_shown(app, person):
     text = somebody.page.text
     for name in app.extensions["study"].techniques:
         assert f"by {name}" not in text and (name == "none" or name not in text)
-    assert text.count("/images/") == 4  # two shown, two fetched beforehand
+    assert 2 < text.count("/images/") <= 4 + 2 * 5  # two, and those of five questions ahead
 
 
 def test_what_the_browser_measured_is_recorded(person):
@@ -55,10 +57,20 @@ def test_what_the_browser_measured_is_recorded(person):
         "device_pixel_ratio": 1.25,
         "shown_width": 630.5,
         "shown_height": 354.66,
+        "view": "beside",
+        "beside_ms": 400,
+        "flicker_ms": 0,
+        "wipe_ms": 0,
+        "away_ms": 32,
+        "flips": 0,
+        "pixel_scale": 0.656,
+        "pixel_scale_largest": 2.0,
+        "seen_share": 1.0,
     }
-    somebody.send("trial", answer=1, rt_ms=4321, **measured)
+    somebody.send("trial", answer=1, rt_ms=432, **measured)
     row = somebody.rows[0]
-    assert (row.rt_ms, row.timed_by, row.times_shown) == (4321, "browser", 1)
+    assert (row.rt_ms, row.timed_by, row.times_shown) == (432, "browser", 1)
+    assert row.rt_reported_ms is None and row.rt_server_ms >= 0
     assert {name: getattr(row, name) for name in measured} == measured
 
 
@@ -66,8 +78,33 @@ def test_without_scripts_the_server_takes_the_time(person):
     somebody = person().begin()
     somebody.send("trial", answer=1)
     row = somebody.rows[0]
-    assert row.timed_by == "server" and row.viewport_width is None
+    assert row.timed_by == "server" and row.viewport_width is None and row.view == "unscripted"
     assert row.rt_ms == round((row.answered_at - row.started_at).total_seconds() * 1000)
+
+
+def test_a_time_that_the_servers_clock_does_not_allow_is_bounded_and_flagged(person, app):
+    from app import export
+
+    somebody = person().begin()
+    somebody.send("trial", answer=1, rt_ms=2**31 - 1, view="beside")
+    somebody.send("trial", answer=1, rt_ms=0, view="beside")
+    long, short = somebody.rows
+    assert long.rt_ms == long.rt_server_ms < 60_000 and long.timed_by == "server"
+    assert long.rt_reported_ms == 2**31 - 1
+    assert (short.rt_ms, short.timed_by, short.rt_reported_ms) == (0, "browser", None)
+    with app.extensions["database"].read() as db:
+        rows = list(export.records(db, app.extensions["study"], simulated=False))
+    assert [row["rt_flag"] for row in rows] == ["impossible", "fast"]
+
+
+def test_a_study_may_refuse_browsers_without_scripts(tmp_path, write_study):
+    app = create_app(write_study(tmp_path / "strict", viewer={"scripts": "required"}))
+    somebody = Person(app).begin()
+    assert "Please allow it for this page" in somebody.page.text
+    assert somebody.send("trial", answer=1).status_code == 400 and somebody.answers == []
+    somebody.get("/question")
+    somebody.send("trial", answer=1, rt_ms=300, view="flicker")
+    assert [row.view for row in somebody.rows] == ["flicker"]
 
 
 @pytest.mark.parametrize("nonsense", ["", "-1", "1e400", "nan", "inf", "9" * 40, "<b>"])
@@ -124,9 +161,9 @@ def test_a_browser_that_lost_when_a_question_was_shown_can_still_answer(person):
     somebody = person().begin()
     with somebody.http.session_transaction() as session:
         del session["shown"]
-    somebody.send("trial", answer=2, rt_ms=3000)
+    somebody.send("trial", answer=2, rt_ms=100)
     [row] = somebody.rows
-    assert (row.answer, row.rt_ms, row.times_shown) == (2, 3000, 1)
+    assert (row.answer, row.rt_ms, row.times_shown) == (2, 100, 1)
     assert row.started_at <= row.answered_at
 
 

@@ -14,7 +14,7 @@ from app.simulation.client import Visitor
 from app.simulation.people import ANSWERING, GAIN_JOD, PUBLISHED_PRIORITIES, Crowd
 from app.study import Study
 
-VARYING = {"started_at", "answered_at"}
+VARYING = {"started_at", "answered_at", "rt_server_ms"}
 
 
 def rows(study_dir):

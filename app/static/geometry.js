@@ -1,0 +1,46 @@
+// Where the images of a pair stand and how large, in whole device pixels; nothing here touches the page.
+// A scale is screen pixels an image pixel: a whole number, or FIT, which is as large as the room allows.
+
+export const FIT = "fit";
+export const GAP = 8, HANDLE = 28; // CSS pixels between the images, and below one for the divider's handle
+const STEP = 16, LARGEST = 8192; // as app/renditions.py makes them
+
+// Height of a box at a width, as the server rounds it.
+export const heightOf = (box, width) => Math.max(1, Math.floor((2 * width * box.height + box.width) / (2 * box.width)));
+
+// The scales that a study allows, the first to begin with.
+export function scales(viewer, fitted) {
+  const whole = Array.from({ length: viewer.zoom }, (_, k) => k + 1);
+  if (viewer.display !== FIT) return whole;
+  return [FIT, ...whole.filter((scale) => viewer.zoom > 1 && scale > fitted + 0.01)];
+}
+
+// The frames of a mode: their size, where they begin in the room, and how wide the picture in them is.
+// room: across, down, caption, gap, below (taken by the divider's handle), device pixels; box: width, height, image pixels.
+export function place(mode, scale, room, box) {
+  const down = room.down - room.caption;
+  if (mode !== "beside") return alone(scale, room, box, down - (mode === "wipe" ? room.below : 0));
+  const beside = frame(scale, box, Math.floor((room.across - room.gap) / 2), down);
+  const above = frame(scale, box, room.across, Math.floor(room.down / 2) - room.caption);
+  const chosen = beside.width * beside.height >= above.width * above.height ? beside : above;
+  const { width, height } = chosen, step = chosen === beside ? { x: width + room.gap, y: 0 } : { x: 0, y: height + room.caption };
+  const x = Math.floor((room.across - width - step.x) / 2), y = Math.max(0, Math.floor((down - height - step.y) / 2));
+  return { ...chosen, origins: [{ x, y }, { x: x + step.x, y: y + step.y }] };
+}
+
+function alone(scale, room, box, down) {
+  const one = frame(scale, box, room.across, down);
+  const x = Math.floor((room.across - one.width) / 2), y = Math.max(0, Math.floor((down - one.height) / 2));
+  return { ...one, origins: [{ x, y }] };
+}
+
+function frame(scale, box, across, down) {
+  if (scale !== FIT) {
+    const width = Math.max(STEP, Math.min(box.width * scale, across)), height = Math.max(STEP, Math.min(box.height * scale, down));
+    return { width, height, picture: box.width, scale };
+  }
+  let width = STEP * Math.floor(Math.min(across, (down * box.width) / box.height, 4 * box.width, LARGEST) / STEP);
+  while (width > STEP && heightOf(box, width) > Math.min(down, LARGEST)) width -= STEP;
+  width = Math.max(STEP, width);
+  return { width, height: heightOf(box, width), picture: width, scale: width / box.width };
+}
