@@ -19,6 +19,7 @@ POSTS = [
     "/familiarity",
     "/question",
     "/withdraw",
+    "/resume/",
     "/another",
     "/dashboard/login",
     "/dashboard/logout",
@@ -46,6 +47,7 @@ OPEN = [
     "/thanks",
     "/withdraw",
     "/withdrawn",
+    "/resume/",
     "/study.css",
     "/dashboard/login",
     "/simulation/",
@@ -59,7 +61,7 @@ def addresses(app, method):
         if method in rule.methods:
             sha256 = next(iter(app.extensions["study"].images_by_sha256))
             values = {"sha256": sha256, "filename": "style.css", "name": "report.html"}
-            values |= {"box": "0-0-64-36", "width": 64}
+            values |= {"box": "0-0-64-36", "width": 64, "code": ""}
             with app.test_request_context():
                 yield url_for(rule.endpoint, **{name: values[name] for name in rule.arguments})
 
@@ -203,7 +205,8 @@ def test_hostile_labels_are_escaped(tmp_path, write_study, request):
 def test_hostile_input_comes_back_escaped(person):
     somebody = person()
     somebody.get("/withdraw")
-    assert "<b>x" not in somebody.send("code", code="<b>x").text
+    assert "<b>x" not in somebody.send("code", code="<b>x", confirm="yes").text
+    assert "<b>x" not in somebody.get("/resume/<b>x").text
     assert "<b>x" not in somebody.get("/<b>x").text
 
 
