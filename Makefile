@@ -2,11 +2,12 @@
 # make demo SERVE=0   the same, but end instead of serving
 # make test           install what is missing, check the style, run every test
 # make test-bayes     install the sampler of `subdermal posterior` too, run its tests
+# make test-postgres  install PostgreSQL and its driver, run the tests of the questionnaire over it
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-bayes demo bench clean
+.PHONY: help setup test test-bayes test-postgres demo bench clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -33,6 +34,12 @@ test-bayes:
 	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
 		--require-hashes --only-binary :all: -r requirements-bayes.lock
 	.venv/bin/python -m pytest tests/posterior
+
+test-postgres:
+	@tools/setup test
+	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
+		--require-hashes --only-binary :all: -r requirements-postgres.lock
+	tools/with-postgres .venv/bin/python -m pytest tests/app --ignore tests/app/test_browser.py
 
 demo: setup
 	$(SUBDERMAL) build stimuli/studies/thesis.toml --out $(OUT)

@@ -17,12 +17,15 @@ def create_app(
     database_url: str | None = None,
     *,
     simulated: bool = False,
+    enrolments: int = 100,
 ) -> Flask:
     """Make the WSGI application of the study in `study_dir` (a folder with a manifest.json).
 
     database_url: an SQLAlchemy URL; by default study.sqlite3 (or simulated.sqlite3) in the folder.
     simulated: whether the database holds simulated answers. It is recorded in the database at its
         creation, and a database of the other kind is refused.
+    enrolments: how many people may begin from one address within ten minutes, in each worker, and
+        ten times that from all together; 0 for no limit. Programs have none.
     """
     from app import dashboard, questionnaire, security, web
     from app.database import Database
@@ -41,6 +44,9 @@ def create_app(
     )
     app.extensions["study"] = study
     app.extensions["database"] = database
+    app.extensions["newcomers"] = (
+        security.Limiter(enrolments, 600) if enrolments and not simulated else None
+    )
     security.init(app)
     web.init(app)
     app.register_blueprint(questionnaire.blueprint)

@@ -4,6 +4,7 @@ for ever.
 
 from __future__ import annotations
 
+import json
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,12 +14,12 @@ from typing import TYPE_CHECKING
 from alembic import command
 from alembic.config import Config
 from alembic.util import CommandError
-from sqlalchemy import Connection, Engine, create_engine, delete, event, make_url
-from sqlalchemy.exc import ArgumentError, DatabaseError, NoSuchModuleError
+from sqlalchemy import Connection, Engine, create_engine, delete, event, make_url, select
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 from sqlalchemy.orm import Session
 
 from app.errors import InputError
-from app.models import Live, StudyRecord
+from app.models import Live, Participant, StudyRecord
 
 if TYPE_CHECKING:
     from app.study import Study
@@ -55,9 +56,10 @@ class Database:
                 _migrate(connection)
         except (NoSuchModuleError, ModuleNotFoundError) as error:
             raise InputError(
-                f"{shown}: there is no driver for such a database here ({error})"
+                f"{shown}: there is no driver for such a database here ({error}); "
+                "PostgreSQL needs pip install 'subdermal[postgres]'"
             ) from None
-        except DatabaseError as error:
+        except DBAPIError as error:
             raise InputError(
                 f"{shown}: cannot be opened as a database ({str(error.orig).splitlines()[0]})"
             ) from None
@@ -81,7 +83,9 @@ class Database:
         with self.write() as session:
             session.execute(delete(Live))  # numbers of a release before this may have another shape
             record = session.get(StudyRecord, 1)
+            content = study.content(images=kind == "real")
             if record is None:
+                expected["content"] = json.dumps(content)
                 session.add(StudyRecord(id=1, secret_key=secrets.token_hex(32), **expected))
                 return
             for key, value in expected.items():
@@ -90,6 +94,14 @@ class Database:
                         f"{shown}: holds answers of another study: {key} is {found!r}, "
                         f"expected {value!r}"
                     )
+            begun = session.scalar(select(Participant.id).limit(1)) is not None
+            kept = json.loads(record.content or "{}") if begun else {}
+            if change := _first_change(kept, content):
+                raise InputError(
+                    f"{shown}: participants saw another study: {change}; put it back, or raise "
+                    "`version`, build again and give it a database of its own (--database)"
+                )
+            record.content = json.dumps(content)  # a new release may show more
 
     @contextmanager
     def read(self) -> Iterator[Session]:
@@ -120,12 +132,41 @@ class Database:
         self._engine.dispose()
 
 
+def _first_change(kept: object, now: object, at: str = "") -> str:
+    """Where what was kept differs from what is there now, in words; '' where it does not. What was
+    not kept yet does not count.
+    """
+    if isinstance(kept, dict) and isinstance(now, dict):
+        for key, value in kept.items():
+            name = f"{at}.{key}" if at else key
+            if key not in now:
+                return f"{name} is gone"
+            if change := _first_change(value, now[key], name):
+                return change
+        return ""
+    if isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
+        changes = (_first_change(*two, f"{at}[{i}]") for i, two in enumerate(zip(kept, now)))
+        return next(filter(None, changes), "")
+    if kept == now:
+        return ""
+    was, is_now = (f"{str(value)[:60]!r}" for value in (kept, now))
+    return f"{at} was {was}, is {is_now}"
+
+
 def connect(url: str) -> Engine:
-    """An engine with our settings; a connection with the option `writes` begins as a writer."""
-    engine = create_engine(url, pool_pre_ping=not url.startswith("sqlite"))
+    """An engine with our settings; a connection with the option `writes` begins as a writer.
+
+    postgresql:// is spoken by pg8000, unless the URL names another driver.
+    """
+    address = make_url(url)
+    if address.drivername in ("postgresql", "postgres"):
+        address = address.set(drivername="postgresql+pg8000")
+    engine = create_engine(address, pool_pre_ping=address.get_backend_name() != "sqlite")
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", _configure_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
+    if engine.dialect.name == "postgresql":
+        event.listen(engine, "begin", _begin_postgresql)
     return engine
 
 
@@ -146,6 +187,14 @@ def _begin_sqlite(connection) -> None:
     """
     writes = connection.get_execution_options().get("writes", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _begin_postgresql(connection) -> None:
+    """A reader sees one snapshot, as it does in SQLite; writers lock the rows that they decide
+    by.
+    """
+    if not connection.get_execution_options().get("writes", False):
+        connection.exec_driver_sql("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
 
 
 def _migrate(connection) -> None:

@@ -14,10 +14,11 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Select, func, select
+from sqlalchemy import ColumnElement, Select, func, select
 from sqlalchemy.orm import Session
 
 from analysis.files import replacing
+from app import recruiting
 from app.models import Participant, Response, Trial
 from app.study import Study
 from stimuli.study import FRAMING
@@ -354,16 +355,16 @@ def columns(study: Study) -> tuple[Column, ...]:
     return (*COLUMNS[:place], *further, *COLUMNS[place:])
 
 
-def counted(*columns: Any) -> Select:
+def counted(*columns: Any, who: ColumnElement[bool] | None = None) -> Select:
     """`select(*columns)` over the answers that count: committed, of participants who did not
-    withdraw.
+    withdraw, were not excluded and did not only try the study out; or of others, `who`.
     """
     return (
         select(*columns)
         .select_from(Response)
         .join(Trial, Response.trial_id == Trial.id)
         .join(Participant, Response.participant_id == Participant.id)
-        .where(Participant.withdrawn_at.is_(None))
+        .where(recruiting.counts() if who is None else who)
     )
 
 
@@ -372,9 +373,11 @@ def count(session: Session) -> int:
     return session.scalar(counted(func.count()))
 
 
-def records(session: Session, study: Study, *, simulated: bool) -> Iterator[dict[str, Any]]:
+def records(
+    session: Session, study: Study, *, simulated: bool, who: ColumnElement[bool] | None = None
+) -> Iterator[dict[str, Any]]:
     """The rows of the table, by participant and order, as mappings."""
-    query = counted(Participant, Trial, Response).order_by(Participant.id, Trial.order)
+    query = counted(Participant, Trial, Response, who=who).order_by(Participant.id, Trial.order)
     described = columns(study)
     for participant, trial, response in session.execute(
         query.execution_options(yield_per=CHUNK_ROWS)
@@ -412,6 +415,13 @@ def responses_csv(session: Session, study: Study, *, simulated: bool) -> Iterato
     """responses.csv, a chunk at a time."""
     names = [column.name for column in columns(study)]
     return _csv(names, (row.values() for row in records(session, study, simulated=simulated)))
+
+
+def pilot_csv(session: Session, study: Study, *, simulated: bool) -> Iterator[str]:
+    """The same of those who tried the study out and did not withdraw."""
+    who = Participant.pilot.is_(True) & Participant.withdrawn_at.is_(None)
+    rows = records(session, study, simulated=simulated, who=who)
+    return _csv([column.name for column in columns(study)], (row.values() for row in rows))
 
 
 def table_csv(names: list[str], rows: Iterable[dict[str, Any]]) -> Iterator[str]:

@@ -83,6 +83,11 @@ class StudyRecord(Base):
         String(255)
     )  # scrypt; None: nobody can log in yet
     simulation_seed: Mapped[int | None] = mapped_column(BigInteger)
+    # JSON: the words and images that participants see, once one has begun
+    content: Mapped[str | None]
+    state: Mapped[str] = mapped_column(String(6), default="open")  # of app.recruiting.STATES
+    quota: Mapped[int | None]  # complete participants that are wanted
+    reservation_minutes: Mapped[int] = mapped_column(default=120)
     created_at: Mapped[datetime] = mapped_column(default=now)
 
     __table_args__ = (
@@ -104,10 +109,13 @@ class Participant(Base):
     completion_code: Mapped[str | None] = mapped_column(String(16), unique=True)  # to be shown
     # to be kept; None: completed before there was one, when the code did both
     withdrawal_key: Mapped[str | None] = mapped_column(String(16), index=True, unique=True)
-    # to go on elsewhere; None: began before there was one
-    resume_code: Mapped[str | None] = mapped_column(String(16), index=True, unique=True)
     completed_at: Mapped[datetime | None]
     withdrawn_at: Mapped[datetime | None]
+    pilot: Mapped[bool] = mapped_column(default=False)  # tried the study out: does not count
+    # JSON: what the recruiter's link said, where the study declares it
+    recruit: Mapped[str | None] = mapped_column(String(2000))
+    excluded_at: Mapped[datetime | None]
+    excluded_because: Mapped[str | None] = mapped_column(String(500))
 
     trials: Mapped[list[Trial]] = relationship(order_by="Trial.order", back_populates="participant")
 
@@ -192,6 +200,9 @@ def _count(column: InstrumentedAttribute) -> Any:
 #: question is the one after the last answer.
 Participant.answered = _count(Response.participant_id)
 Participant.questions = _count(Trial.participant_id)
+Participant.study_state = column_property(
+    select(StudyRecord.state).where(StudyRecord.id == 1).scalar_subquery(), deferred=True
+)
 
 
 class Event(Base):
@@ -210,6 +221,17 @@ class Event(Base):
 
 
 Index(None, Event.participant_id, Event.trial_id, Event.kind)
+
+
+class LogEntry(Base):
+    """What researchers did: states, quotas, exclusions. Only ever appended."""
+
+    __tablename__ = "log"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    at: Mapped[datetime] = mapped_column(default=now)
+    action: Mapped[str] = mapped_column(String(40))
+    detail: Mapped[str] = mapped_column(String(1000))
 
 
 class Live(Base):

@@ -78,6 +78,13 @@ class Study:
         # the key is that of the first databases, in which a cell was a framing
         return json.dumps({"framings": self.cells, "techniques": self.techniques})
 
+    def content(self, *, images: bool) -> dict:
+        """What participants see: the study's words and levels, and its images by their hashes."""
+        seen = {key: value for key, value in self.definition.record().items() if key != "analysis"}
+        if images:
+            seen["images"] = {f"{i.cell} {i.technique}": i.sha256 for i in self.manifest.images}
+        return json.loads(json.dumps(seen))
+
     @cached_property
     def images_by_sha256(self) -> dict[str, Image]:
         return {image.sha256: image for image in self.manifest.images}

@@ -362,7 +362,7 @@ def main() -> None:
         other = options.database or f"sqlite:///{folder}/bare.sqlite3"
         workers = "--workers", str(options.workers)
         ours = ("-m", "app.cli", "serve", str(study), "--port", "0", "--database", url, *workers)
-        # ours += ("--enrolments", "0")
+        ours += ("--enrolments", "0")
         with served(__file__, "--bare", other, *workers) as bare, served(*ours) as asked:
             asyncio.run(measure(options, study, url, bare, asked))
 

@@ -16,7 +16,6 @@ from pathlib import Path
 
 from analysis.declared import options
 from analysis.manifest import WHOLE, read_region, read_self_rating
-from stimuli.asking import Participants, read_participants
 from stimuli.errors import InputError
 from stimuli.parts import read_toml
 from stimuli.scenes import load_table, merge
@@ -190,7 +189,6 @@ class Study:
     scene: dict | None = None
     analysis: dict = field(default_factory=dict)
     viewer: Viewer = Viewer()
-    participants: Participants = Participants()
 
     @property
     def framings(self) -> tuple[Level, ...]:
@@ -257,7 +255,6 @@ class Study:
             },
             "consent": self.consent,
             "viewer": self.viewer.record(),
-            "participants": vars(self.participants),
             **({"analysis": self.analysis} if self.analysis else {}),
         }
 
@@ -331,7 +328,6 @@ def read_study(
         scene=scene,
         analysis=_analysis(table),
         viewer=read_viewer(table.table("viewer", default={}), display),
-        participants=read_participants(table.table("participants", default={})),
     )
     refuse_doubles(techniques, "name")
     refuse_doubles(techniques, "label")

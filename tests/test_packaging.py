@@ -13,8 +13,8 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[1]
 
 
-LOCKS = ("requirements.lock", "requirements-bayes.lock")
-MORE_THAN = dict(zip(LOCKS, (40, 4)))
+LOCKS = ("requirements.lock", "requirements-bayes.lock", "requirements-postgres.lock")
+MORE_THAN = dict(zip(LOCKS, (40, 4, 2)))
 
 
 def read(name):
@@ -42,7 +42,7 @@ def test_lock_names_no_address(name):
     assert not re.search(r"://|index-url|find-links|@ ", (ROOT / name).read_text())
 
 
-@pytest.mark.parametrize(("name", "extra"), list(zip(LOCKS, ("dev", "bayes"))))
+@pytest.mark.parametrize(("name", "extra"), list(zip(LOCKS, ("dev", "bayes", "postgres"))))
 def test_lock_holds_what_the_project_asks_for(name, extra):
     project, lock = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"], read(name)
     asked = project["dependencies"] if extra == "dev" else []
@@ -54,4 +54,5 @@ def test_lock_holds_what_the_project_asks_for(name, extra):
 
 
 def test_the_locks_share_no_package():
-    assert not set(read(LOCKS[0])) & set(read(LOCKS[1]))
+    for name in LOCKS[1:]:
+        assert not set(read(LOCKS[0])) & set(read(name))

@@ -34,6 +34,13 @@ import click
     help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.",
 )
 @click.option(
+    "--enrolments",
+    default=100,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="People who may begin from one address within ten minutes; 0 for no limit.",
+)
+@click.option(
     "--reset-password",
     is_flag=True,
     help="Set a new dashboard password, show it once, and end every login.",
@@ -52,6 +59,7 @@ def command(
     port: int,
     workers: int,
     database: str | None,
+    enrolments: int,
     reset_password: bool,
     trusted_proxy: str | None,
 ) -> None:
@@ -63,10 +71,9 @@ def command(
     """
     from werkzeug.middleware.dispatcher import DispatcherMiddleware
 
-    from app import create_app, server
-    from app.dashboard import password
+    from app import create_app, password, server
 
-    app = create_app(directory, database)
+    app = create_app(directory, database, enrolments=enrolments)
     study, answers = app.extensions["study"], app.extensions["database"]
     application, simulated = app, (study.directory / "simulated.sqlite3").is_file()
     if simulated:

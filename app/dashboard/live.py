@@ -9,14 +9,16 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import case, func, select
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from app import export
+from app import export, recruiting
 from app.database import Database
-from app.models import Event, Live, Participant, Response, Trial, now
+from app.models import Event, Live, LogEntry, Participant, Response, Trial, now
 from app.study import Study
 
 if TYPE_CHECKING:
+    from analysis.options import Exclusions, Options
     from analysis.responses import Responses
 
 #: Numbers are at least so old when they are made anew, and making them takes at most this share of
@@ -28,6 +30,9 @@ OLDEST = timedelta(minutes=1)
 #: How long others wait for somebody who is making numbers; who was killed meanwhile holds up no
 #: longer.
 CLAIM = timedelta(minutes=1)
+#: By the server's clock, all answers together came faster than the rule for their median allows;
+#: and a browser said that an answer took longer than its question had been there.
+TOO_FAST, TIMES_DOUBTFUL = "too_fast", "times_doubtful"
 #: Participants on the page that updates itself; all are in participants.csv.
 LATEST = 50
 #: Without an answer for this long, an unfinished participant counts as dropped out (and may still
@@ -56,24 +61,26 @@ def shared(database: Database, study: Study, period_s: float = PERIOD_S) -> dict
         made = numbers(db, study)
         made["version"] = f"{about}@{now().timestamp():.3f}"
         pause = timedelta(seconds=max(period_s, (monotonic() - began) / SHARE) if period_s else 0)
-    with database.write() as db:
-        db.merge(
-            Live(
-                id=1,
-                about=about,
-                made_at=time,
-                next_at=now() + pause,
-                claimed_until=None,
-                numbers=json.dumps(made),
-            )
-        )
+    row = {
+        "about": about,
+        "made_at": time,
+        "next_at": now() + pause,
+        "claimed_until": None,
+        "numbers": json.dumps(made),
+    }
+    try:
+        with database.write() as db:
+            db.merge(Live(id=1, **row))
+    except IntegrityError:
+        pass  # the very first numbers, made twice at once: one is kept
     return made
 
 
 def _about(db: Session) -> str:
     """Changes with everything that happens: rows are only ever appended."""
-    newest = select(select(func.max(Response.id)).scalar_subquery(), func.max(Event.id))
-    return "{}.{}".format(*(value or 0 for value in db.execute(newest).one()))
+    tables = (Response, Event, LogEntry)
+    newest = select(*(select(func.max(table.id)).scalar_subquery() for table in tables))
+    return ".".join(str(value or 0) for value in db.execute(newest).one())
 
 
 def _due(kept: Live, about: str, time: datetime) -> bool:
@@ -83,7 +90,7 @@ def _due(kept: Live, about: str, time: datetime) -> bool:
 
 def numbers(db: Session, study: Study) -> dict[str, Any]:
     """Everything the dashboard shows that changes; plain numbers and texts, ready for JSON."""
-    answers = responses(db, study)
+    answers, record = responses(db, study), recruiting.record_of(db)
     people = participants(db, study, answers)
     states = [person["state"] for person in people]
     return {
@@ -93,6 +100,9 @@ def numbers(db: Session, study: Study) -> dict[str, Any]:
             "in_progress": states.count("in progress"),
             "dropped_out": states.count("dropped out"),
             "withdrawn": states.count("withdrawn"),
+            "excluded": states.count("excluded"),
+            "pilot": states.count("pilot"),
+            "places": recruiting.places(db, record),
             "answers": export.count(db),
             "about_other_images": about_other_images(db, study),
         },
@@ -118,24 +128,37 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
     """Each participant, latest first: how far, in which state, the median time of an answer, and
     which declared rules they break.
     """
-    counted = select(Response.participant_id, func.count(), func.max(Response.answered_at))
-    given = {
-        one: (count, last)
-        for one, count, last in db.execute(counted.group_by(Response.participant_id))
-    }
+    counted = select(
+        Response.participant_id,
+        func.count(),
+        func.max(Response.answered_at),
+        func.count(Response.rt_reported_ms),
+    )
+    given = {row[0]: row[1:] for row in db.execute(counted.group_by(Response.participant_id))}
+    fastest_ms = rules(study).median_rt_ms
     asked = dict(
         db.execute(select(Trial.participant_id, func.count()).group_by(Trial.participant_id)).all()
     )
     judged = quality(study, answers)
     result = []
     for person in db.scalars(select(Participant).order_by(Participant.id.desc())):
-        count, last = given.get(person.id, (0, person.consented_at))
+        count, last, doubtful = given.get(person.id, (0, person.consented_at, 0))
         state = "dropped out" if now() - last > IDLE else "in progress"
         if person.completed_at:
             state = "completed"
+        if person.pilot:
+            state = "pilot"
+        if person.excluded_at:
+            state = "excluded"
         if person.withdrawn_at:
             state = "withdrawn"
-        median_ms, flags = judged.get(person.code, (None, ""))
+        median_ms, broken = judged.get(person.code, (None, ""))
+        flags = [broken] if broken and state != "in progress" else []  # half-way is not too little
+        took_ms = (last - person.consented_at).total_seconds() * 1000
+        if fastest_ms is not None and count and took_ms < count * fastest_ms:
+            flags.append(TOO_FAST)
+        if doubtful:
+            flags.append(TIMES_DOUBTFUL)
         result.append(
             {
                 "code": person.code,
@@ -145,8 +168,7 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
                 "questions": asked.get(person.id, 0),
                 "state": state,
                 "median_s": None if median_ms is None else round(median_ms / 1000, 1),
-                # who is half-way has not answered too little yet
-                "flags": flags if state != "in progress" else "",
+                "flags": ", ".join(flags),
             }
         )
     return result
@@ -159,10 +181,20 @@ def quality(study: Study, answers: Responses | None) -> dict[str, tuple[float, s
     if answers is None:
         return {}
     from analysis.agreement import participants as judge
+
+    table = judge(answers, declared(study))
+    return {row.participant: (row.median_rt_ms, row.excluded) for row in table.itertuples()}
+
+
+def declared(study: Study) -> Options:
     from analysis.declared import options
 
-    table = judge(answers, options(study.definition.analysis, "the study"))
-    return {row.participant: (row.median_rt_ms, row.excluded) for row in table.itertuples()}
+    return options(study.definition.analysis, "the study")
+
+
+def rules(study: Study) -> Exclusions:
+    """The study's rules of exclusion."""
+    return declared(study).exclusions
 
 
 def stopped(people: list[dict[str, Any]]) -> list[dict[str, int]]:

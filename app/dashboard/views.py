@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import ExitStack
 
 from flask import (
@@ -17,15 +18,19 @@ from flask import (
     send_from_directory,
     url_for,
 )
+from sqlalchemy import select
+from sqlalchemy.orm import Session
 
-from app import export
-from app.dashboard import live, password
-from app.models import plain_code
+from app import export, password, recruiting
+from app.dashboard import live
+from app.models import LogEntry, Participant, plain_code
 from app.security import REPORT_POLICY, Limiter
 from app.web import database, simulated, study, wants_json
 
 blueprint = Blueprint("dashboard", __name__, url_prefix="/dashboard")
 _logins = Limiter(attempts=5, window_s=300)
+#: Of the log, on the page; log.csv has all.
+LATEST_ENTRIES = 10
 
 
 @blueprint.before_request
@@ -67,8 +72,13 @@ def logout():
 
 @blueprint.get("/")
 def index():
+    with database().read() as db:
+        record, entries = recruiting.record_of(db), _entries(db)[:LATEST_ENTRIES]
     return render_template(
         "dashboard/index.html",
+        record=record,
+        states=recruiting.STATES,
+        log=entries,
         images=study().manifest.images,
         cell_labels={
             cell.name: study().definition.cell_label(cell) for cell in study().definition.cells
@@ -120,6 +130,88 @@ def participants_csv():
         people = live.participants(db, study(), live.responses(db, study()))
     body = "".join(export.table_csv(list(people[0]) if people else ["code"], people))
     return _download(body, "participants.csv")
+
+
+@blueprint.get("/participants/<code>")
+def participant(code: str):
+    """One person: what they are flagged for, and leaving them out or letting them count again."""
+    with database().read() as db:
+        someone = _someone(db, code)
+        people = live.participants(db, study(), live.responses(db, study()))
+        row = next(one for one in people if one["code"] == someone.code)
+        entries = _entries(db, LogEntry.detail.startswith(f"{someone.code}: "))
+    return render_template("dashboard/participant.html", person=someone, row=row, log=entries)
+
+
+@blueprint.post("/participants/<code>")
+def judge(code: str):
+    """Exclude a participant, or restore one, for a reason."""
+    reason = " ".join(request.form.get("reason", "").split())
+    if not reason:
+        flash("Please say why: the reason stays in the log.")
+    else:
+        with database().write() as db:
+            someone = _someone(db, code)
+            change = recruiting.restore if someone.excluded_at else recruiting.exclude
+            change(db, someone, reason)
+    return redirect(url_for(".participant", code=code), 303)
+
+
+def _someone(db: Session, code: str) -> Participant:
+    number = code.removeprefix("P")
+    found = db.get(Participant, int(number)) if re.fullmatch(r"[0-9]{4,18}", number) else None
+    if found is None or found.code != code:
+        abort(404, "There is no such participant.")
+    return found
+
+
+@blueprint.post("/state")
+def state():
+    """Open, pause, close the study, or try it out."""
+    chosen = request.form.get("state", "")
+    if chosen not in recruiting.STATES:
+        abort(400, f"The state is one of {', '.join(recruiting.STATES)}.")
+    with database().write() as db:
+        recruiting.set_state(db, chosen)
+    flash(f"The study is {chosen}: {recruiting.STATES[chosen]}.")
+    return redirect(url_for(".index"), 303)
+
+
+@blueprint.post("/quota")
+def quota():
+    """How many complete participants are wanted, and how long a place is kept for who began."""
+    wanted, minutes = (request.form.get(name, "").strip() for name in ("quota", "minutes"))
+    good = re.fullmatch(r"[1-9][0-9]{0,6}|", wanted) and re.fullmatch(r"[1-9][0-9]{0,5}", minutes)
+    if not good:
+        flash("A quota is a whole number from 1, or nothing; a place is kept for minutes from 1.")
+    else:
+        with database().write() as db:
+            recruiting.set_quota(db, int(wanted) if wanted else None, int(minutes))
+    return redirect(url_for(".index"), 303)
+
+
+@blueprint.get("/log.csv")
+def log_csv():
+    """What was done here: states, quotas, exclusions with their reasons."""
+    with database().read() as db:
+        rows = [
+            {"at": entry.at.isoformat(timespec="seconds"), "action": entry.action}
+            | {"detail": entry.detail}
+            for entry in _entries(db)
+        ]
+    return _download("".join(export.table_csv(["at", "action", "detail"], rows)), "log.csv")
+
+
+def _entries(db: Session, *which) -> list[LogEntry]:
+    return list(db.scalars(select(LogEntry).where(*which).order_by(LogEntry.id.desc())))
+
+
+@blueprint.get("/pilot_responses.csv")
+def pilot_responses_csv():
+    """The answers of who tried the study out, which are in no other table."""
+    with database().read() as db:
+        body = "".join(export.pilot_csv(db, study(), simulated=simulated()))
+    return _download(body, "pilot_responses.csv")
 
 
 @blueprint.post("/completion")

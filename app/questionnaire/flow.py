@@ -16,9 +16,11 @@ from sqlalchemy import Connection, Row, bindparam, insert, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, undefer
 
+from app import recruiting
 from app.assignment import assign
 from app.database import Database
 from app.models import Event, Participant, Response, Trial, now, plain_code
+from app.recruiting import Door
 from app.study import Study
 
 #: No letters or digits that look alike; 10 of them are 48 bits.
@@ -76,18 +78,28 @@ def find(session: Session, visit: str | None, *, lock: bool = False) -> Particip
 _FIND = (
     select(Participant)
     .where(Participant.visit == bindparam("visit"))
-    .options(undefer(Participant.answered), undefer(Participant.questions))
+    .options(
+        undefer(Participant.answered),
+        undefer(Participant.questions),
+        undefer(Participant.study_state),
+    )
 )
 _FIND_AND_LOCK = _FIND.with_for_update()
 
 
-def enrol(session: Session, study: Study, visit: str) -> Participant:
+def enrol(
+    session: Session, study: Study, visit: str, *, insider: bool = False, recruit: str | None = None
+) -> Participant | Door:
     """The participant of a visit, with the trials assigned; consent given twice is one
-    participant.
+    participant. The door where nobody can begin now.
     """
+    record = recruiting.record_of(session, lock=True)  # before looking: two clicks are one person
     if participant := find(session, visit):
         return participant
-    participant = Participant(visit=visit, resume_code=_secret())
+    if (door := recruiting.door(session, record, insider=insider)) is not Door.OPEN:
+        return door
+    pilot = record.state in ("draft", "pilot")
+    participant = Participant(visit=visit, pilot=pilot, recruit=recruit)
     session.add(participant)
     session.flush()  # gives the number
     session.add_all(assign(study, participant))
@@ -130,6 +142,7 @@ class Standing:
     withdrawn_at: datetime | None
     answered: int
     questions: int
+    study_state: str
 
 
 @dataclass(frozen=True)
@@ -199,8 +212,14 @@ def _answer(
     asked = connection.execute(_ASKED, {"trial": trial_id, "visit": visit}).one_or_none()
     if asked is None:
         return None
-    here = Standing(asked.familiarity, asked.withdrawn_at, asked.answered, asked.questions)
-    if asked.order is None or asked.withdrawn_at:
+    here = Standing(
+        asked.familiarity,
+        asked.withdrawn_at,
+        asked.answered,
+        asked.questions,
+        asked.study_state,
+    )
+    if asked.order is None or asked.withdrawn_at or asked.study_state == "closed":
         return Outcome.STALE, here
     if asked.answer is not None:
         if asked.answer == given.value:
@@ -259,6 +278,7 @@ _ASKED = (
         Participant.consented_at,
         Participant.answered.expression.label("answered"),
         Participant.questions.expression.label("questions"),
+        Participant.study_state.expression.label("study_state"),
         Trial.order,
         Trial.cell,
         Trial.left,
@@ -311,12 +331,6 @@ def find_by_key(session: Session, key: str) -> Participant | None:
     old = Participant.withdrawal_key.is_(None) & (Participant.completion_code == plain)
     asked = select(Participant).where((Participant.withdrawal_key == plain) | old)
     return session.scalar(asked) if plain else None
-
-
-def find_by_resume_code(session: Session, code: str) -> Participant | None:
-    """The participant who was given a code to go on elsewhere, however it was typed."""
-    plain = plain_code(code)
-    return session.scalar(select(Participant).filter_by(resume_code=plain)) if plain else None
 
 
 def _note(session: Session, participant: Participant, kind: str) -> None:

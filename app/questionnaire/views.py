@@ -10,6 +10,7 @@ import secrets
 from flask import (
     Blueprint,
     abort,
+    current_app,
     flash,
     jsonify,
     redirect,
@@ -21,9 +22,11 @@ from flask import (
 from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
+from app import password, recruiting
 from app.models import Participant
 from app.questionnaire import flow, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
+from app.recruiting import Door
 from app.security import Limiter
 from app.web import database, simulated, study, wants_json
 from stimuli.manifest import Image
@@ -68,6 +71,9 @@ def welcome():
                     return render_template("questionnaire/simulated.html")
                 session["visit"] = secrets.token_urlsafe(16)
                 session.permanent = True
+            door = recruiting.door(db, recruiting.record_of(db), insider=password.logged_in())
+            if door is not Door.OPEN:
+                return _closed(door)
             return render_template(
                 "questionnaire/consent.html",
                 paragraphs=study().consent,
@@ -77,7 +83,7 @@ def welcome():
                 ],
             )
         place = _place(participant)
-        if place in ("questionnaire.thanks", "questionnaire.withdrawn"):
+        if place in ("questionnaire.thanks", "questionnaire.withdrawn", "questionnaire.closed"):
             return redirect(url_for(place))
         return render_template("questionnaire/back.html", place=place, participant=participant)
 
@@ -91,10 +97,31 @@ def consent():
     if request.form.get("consent") != "yes":
         flash("Please tick the box if you want to take part.")
         return redirect(url_for(".welcome"), 303)
+    newcomers = current_app.extensions["newcomers"]
+    if newcomers and not newcomers.allow(request.remote_addr):
+        abort(
+            429,
+            "Very many people began from your network just now. Please wait some minutes and try "
+            "again.",
+        )
+    insider = password.logged_in()
     with database().write() as db:
-        participant = flow.enrol(db, study(), session["visit"])
+        participant = flow.enrol(db, study(), session["visit"], insider=insider)
+        if isinstance(participant, Door):
+            return _closed(participant)
         place = _place(participant)
     return redirect(url_for(place), 303)
+
+
+def _closed(door: Door):
+    return render_template("questionnaire/door.html", message=door.value), 403
+
+
+@blueprint.get("/closed")
+def closed():
+    """For who has begun, after the study was closed."""
+    with database().read() as db:
+        return _redirect_to_due(_participant(db)) or _closed(Door.CLOSED)
 
 
 @blueprint.get("/familiarity")
@@ -171,10 +198,7 @@ def answer():
     visit, bound = session.get("visit", ""), not simulated()
     said = flow.answer(database(), study(), visit, trial, given, shown, bound=bound)
     if said is None:
-        message = "This browser has not begun the questionnaire, or lost its cookies."
-        if wants_json():
-            return jsonify(error=message, lost=True), 400
-        abort(400, message)
+        abort(400, "This browser has not begun the questionnaire.")
     outcome, here = said
     if here.answered == here.questions:
         # the answers are on the disk: now the committed ones can be counted
@@ -214,9 +238,6 @@ def withdraw():
 @blueprint.post("/withdraw")
 def withdraw_now():
     """Withdraw this browser's participant, or the one who was given a withdrawal key."""
-    if request.form.get("confirm") != "yes":
-        flash("Nothing was withdrawn. Please tick the box if you want to withdraw.")
-        return redirect(url_for(".withdraw"), 303)
     with database().write() as db:
         if "code" in request.form:
             if not _code_attempts.allow(request.remote_addr):
@@ -243,44 +264,11 @@ def withdrawn():
         return _redirect_to_due(_participant(db)) or render_template("questionnaire/withdrawn.html")
 
 
-@blueprint.get("/resume/")
-@blueprint.get("/resume/<code>")
-def resume(code: str = ""):
-    """Where somebody goes on who began in another browser, or whose cookies were cleared."""
-    return render_template("questionnaire/resume.html", code=code)
-
-
-@blueprint.post("/resume/")
-def resume_now():
-    if not _code_attempts.allow(request.remote_addr):
-        abort(429, "Too many codes were tried. Wait five minutes and try again.")
-    with database().read() as db:
-        participant = flow.find_by_resume_code(db, request.form.get("resume", ""))
-        own = _participant(db)
-        if participant is None:
-            flash("Nobody was given this code. Please check it.")
-            return redirect(url_for(".resume"), 303)
-        if own is not None and own.id != participant.id and _place(own) in _UNFINISHED:
-            flash("This browser is in the middle of another person's questions; they go on here.")
-            return redirect(url_for(_place(own)), 303)
-        session["visit"] = participant.visit
-        session.permanent = True
-        participant = _participant(db)
-    _code_attempts.forget(request.remote_addr)
-    return redirect(url_for(_place(participant)), 303)
-
-
 @blueprint.post("/another")
 def another():
-    """Let another person begin in this browser, where the study's people share one."""
-    if not study().definition.participants.shared_device:
-        abort(403, "In this study one browser is for one person.")
+    """Let another person begin in this browser."""
     session.pop("visit", None)
     return redirect(url_for(".welcome"), 303)
-
-
-#: Pages of somebody who has begun and has not finished.
-_UNFINISHED = ("questionnaire.familiarity", "questionnaire.question")
 
 
 def _participant(db: Session, *, lock: bool = False) -> Participant | None:
@@ -293,9 +281,12 @@ def _place(here: Participant | Standing | None) -> str:
         return "questionnaire.welcome"
     if here.withdrawn_at:
         return "questionnaire.withdrawn"
+    unfinished = here.answered < here.questions
+    if unfinished and here.study_state == "closed":
+        return "questionnaire.closed"
     if here.familiarity is None:
         return "questionnaire.familiarity"
-    return "questionnaire.question" if here.answered < here.questions else "questionnaire.thanks"
+    return "questionnaire.question" if unfinished else "questionnaire.thanks"
 
 
 def _redirect_to_due(participant: Participant | None):

@@ -7,10 +7,7 @@ QUESTION = {
     "sending": "Saving the answer that was not sent yet …",
     "unsaved": "Not saved yet, trying again …",
     "waiting": "Saved. Waiting for the next question …",
-    "rejected": "The answer was not accepted. Please reload the page and answer again.",
-    "stale": "That was not the current question; nothing was changed. Please go on here.",
-    "refused": "That question was answered already, perhaps in another tab; the first answer was "
-    "kept.",
+    "refused": "The answer was not accepted. Please reload the page and answer again.",
     "resampled": "resampled, {percent} %",
     "image": "Image",
 }

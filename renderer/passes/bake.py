@@ -105,8 +105,7 @@ def body(item: Item) -> Body:
         proxy = part.proxy
         positions, normals = item.in_world(proxy.positions), item.turned(proxy.normals)
         albedo, value = proxy.albedo, part.material.value
-        mapped = "albedo_map" in part.material.maps
-        if isinstance(value, Skin) and proxy.masks is not None and not mapped:
+        if isinstance(value, Skin) and proxy.masks is not None:
             albedo = value.mean_albedo(proxy.masks)
         return Body(positions, normals, proxy.faces, np.asarray(albedo), proxy.smooth)
     positions, normals = item.in_world(part.positions), item.turned(part.normals)

@@ -6,19 +6,60 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import secrets
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from sqlalchemy import select
+from sqlalchemy import create_engine, make_url, select, text
 
 from app import create_app
+from app.database import Database
 from app.models import Participant, Response
 from app.simulation.client import forms
+from app.study import Study
 
 FRAMINGS = ("close-up", "head-shot", "half-length")
 TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
+
+
+@pytest.fixture(autouse=True)
+def database_of_the_test(request, monkeypatch):
+    """With POSTGRES_URL (`make test-postgres`), every study has its databases there; tests marked
+    `sqlite` are about SQLite alone.
+    """
+    if not (server := os.environ.get("POSTGRES_URL")):
+        yield
+        return
+    if request.node.get_closest_marker("sqlite"):
+        pytest.skip("about SQLite")
+    engine = create_engine(
+        make_url(server).set(drivername="postgresql+pg8000"), isolation_level="AUTOCOMMIT"
+    )
+    made, opened = {}, []
+
+    def url(study, simulated):
+        key = study.directory, simulated
+        if key not in made:
+            made[key] = f"t{secrets.token_hex(8)}"
+            with engine.connect() as db:
+                db.execute(text(f"CREATE DATABASE {made[key]}"))
+        return make_url(server).set(database=made[key]).render_as_string(hide_password=False)
+
+    init = Database.__init__
+    monkeypatch.setattr(Study, "database_url", url)
+    monkeypatch.setattr(
+        Database, "__init__", lambda self, *a: (init(self, *a), opened.append(self))[0]
+    )
+    yield
+    for database in opened:
+        database.close()
+    with engine.connect() as db:
+        for name in made.values():
+            db.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
+    engine.dispose()
 
 
 @pytest.fixture
@@ -76,7 +117,7 @@ def person(app):
 @pytest.fixture
 def experimenter(app):
     """A browser that is logged in to the dashboard."""
-    from app.dashboard import password
+    from app import password
 
     visitor = Person(app)
     visitor.get("/dashboard/login")

@@ -31,6 +31,7 @@ def test_the_manifest_opens(folder):
     assert "{" not in manifest.study.consent
 
 
+@pytest.mark.sqlite
 def test_the_database_opens_and_goes_on(folder):
     before = sqlite3.connect(folder / "study.sqlite3").execute("SELECT framing FROM trials")
     framings = [row[0] for row in before]

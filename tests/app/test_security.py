@@ -6,8 +6,7 @@ import pytest
 from flask import url_for
 from sqlalchemy import select
 
-from app import create_app
-from app.dashboard import password
+from app import create_app, password
 from app.models import StudyRecord
 from app.security import Limiter
 
@@ -19,11 +18,13 @@ POSTS = [
     "/familiarity",
     "/question",
     "/withdraw",
-    "/resume/",
     "/another",
     "/dashboard/login",
     "/dashboard/logout",
     "/dashboard/completion",
+    "/dashboard/state",
+    "/dashboard/quota",
+    "/dashboard/participants/P0001",
     "/simulation/",
 ]
 CLOSED = [
@@ -33,6 +34,9 @@ CLOSED = [
         "live.json",
         "responses.csv",
         "participants.csv",
+        "participants/P0001",
+        "pilot_responses.csv",
+        "log.csv",
         "completions.csv",
         "codebook.csv",
         "codebook.md",
@@ -47,7 +51,7 @@ OPEN = [
     "/thanks",
     "/withdraw",
     "/withdrawn",
-    "/resume/",
+    "/closed",
     "/study.css",
     "/dashboard/login",
     "/simulation/",
@@ -61,7 +65,7 @@ def addresses(app, method):
         if method in rule.methods:
             sha256 = next(iter(app.extensions["study"].images_by_sha256))
             values = {"sha256": sha256, "filename": "style.css", "name": "report.html"}
-            values |= {"box": "0-0-64-36", "width": 64, "code": ""}
+            values |= {"box": "0-0-64-36", "width": 64, "code": "P0001"}
             with app.test_request_context():
                 yield url_for(rule.endpoint, **{name: values[name] for name in rule.arguments})
 
@@ -205,8 +209,7 @@ def test_hostile_labels_are_escaped(tmp_path, write_study, request):
 def test_hostile_input_comes_back_escaped(person):
     somebody = person()
     somebody.get("/withdraw")
-    assert "<b>x" not in somebody.send("code", code="<b>x", confirm="yes").text
-    assert "<b>x" not in somebody.get("/resume/<b>x").text
+    assert "<b>x" not in somebody.send("code", code="<b>x").text
     assert "<b>x" not in somebody.get("/<b>x").text
 
 
@@ -283,6 +286,7 @@ def test_logging_out(experimenter):
     assert experimenter.path == "/dashboard/login"
 
 
+@pytest.mark.sqlite
 def test_nothing_says_who_the_visitor_is(app, person, study_dir):
     somebody = person()
     somebody.http.environ_base["REMOTE_ADDR"] = "203.0.113.77"

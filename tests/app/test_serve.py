@@ -19,6 +19,9 @@ import pytest
 from app import create_app
 from app.cli import main
 
+pytestmark = (
+    pytest.mark.sqlite
+)  # processes of their own, which know nothing of the tests' databases
 LINES = {"questionnaire": r"questionnaire\s+(\S+)", "password": r"password\s+(\S+)"}
 
 

@@ -1,0 +1,103 @@
+"""Who may begin: states of a study, quotas by complete answers, reservations that expire.
+
+A place is taken by who has finished and counts, and by who is at it: begun or answered within the
+time of a reservation. Whether there is one, and taking it, is one transaction.
+"""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from enum import Enum
+
+from sqlalchemy import and_, func, or_, select
+from sqlalchemy.orm import Session
+
+from app.models import LogEntry, Participant, Response, StudyRecord, now
+
+#: States of a study, with what they mean to participants.
+STATES = {
+    "draft": "nobody can begin, but who is logged in to the dashboard",
+    "pilot": "everybody can try it; their answers are kept apart and do not count",
+    "open": "everybody can begin, and answers count",
+    "paused": "nobody can begin; who has begun goes on",
+    "closed": "nobody can begin or answer; withdrawing stays possible",
+}
+
+
+class Door(Enum):
+    """What a visitor finds; the value is what the page says."""
+
+    OPEN = ""
+    DRAFT = "This study has not begun yet. Please come back later."
+    PAUSED = "This study takes a pause. Please come back later."
+    CLOSED = "This study has ended. Thank you for your interest."
+    FULL = "All places of this study are taken. Thank you for your interest."
+
+
+def record_of(session: Session, *, lock: bool = False) -> StudyRecord:
+    """The study's row; lock: nobody else takes a place meanwhile (SQLite has one writer anyway)."""
+    query = select(StudyRecord).where(StudyRecord.id == 1)
+    return session.scalars(query.with_for_update() if lock else query).one()
+
+
+def door(session: Session, record: StudyRecord, *, insider: bool) -> Door:
+    """Whether a newcomer may begin. insider: is logged in to the dashboard."""
+    if record.state == "draft":
+        return Door.OPEN if insider else Door.DRAFT
+    if record.state in ("paused", "closed"):
+        return Door[record.state.upper()]
+    full = record.state == "open" and record.quota is not None
+    return Door.FULL if full and places(session, record) >= record.quota else Door.OPEN
+
+
+def places(session: Session, record: StudyRecord) -> int:
+    """How many places are taken."""
+    since = now() - timedelta(minutes=record.reservation_minutes)
+    last = select(func.max(Response.answered_at)).where(Response.participant_id == Participant.id)
+    at_it = and_(
+        Participant.completed_at.is_(None),
+        or_(Participant.consented_at > since, last.scalar_subquery() > since),
+    )
+    query = select(func.count()).where(counts(), or_(Participant.completed_at.is_not(None), at_it))
+    return session.scalar(query)
+
+
+def counts():
+    """The participants whose answers count, as an SQL condition."""
+    return and_(
+        Participant.withdrawn_at.is_(None),
+        Participant.excluded_at.is_(None),
+        Participant.pilot.is_(False),
+    )
+
+
+def note(session: Session, action: str, detail: str) -> None:
+    """Append to the log."""
+    session.add(LogEntry(action=action, detail=detail[:1000]))
+
+
+def set_state(session: Session, state: str) -> None:
+    record = record_of(session, lock=True)
+    if record.state != state:
+        note(session, "state", f"{record.state} to {state}")
+        record.state = state
+
+
+def set_quota(session: Session, quota: int | None, minutes: int) -> None:
+    record = record_of(session, lock=True)
+    note(session, "quota", f"{record.quota or 'none'} to {quota or 'none'}, {minutes} minutes")
+    record.quota, record.reservation_minutes = quota, minutes
+
+
+def exclude(session: Session, participant: Participant, reason: str) -> None:
+    """Leave a participant's answers out of every export, tally and figure; nothing is lost."""
+    if participant.excluded_at is None:
+        participant.excluded_at, participant.excluded_because = now(), reason[:500]
+        note(session, "exclude", f"{participant.code}: {reason}")
+
+
+def restore(session: Session, participant: Participant, reason: str) -> None:
+    """Let them count again."""
+    if participant.excluded_at is not None:
+        participant.excluded_at = participant.excluded_because = None
+        note(session, "restore", f"{participant.code}: {reason}")
