@@ -24,10 +24,10 @@ from analysis.manifest import WHOLE
 from stimuli import manifest, sources
 from stimuli.errors import InputError, Stopped
 from stimuli.parts import PEOPLE
+from stimuli.scenes import MAP_ENDING
 from stimuli.study import FRAMING, Cell, Study
 
 STATE = "build.json"
-MAPS = ("albedo_map", "normal_map", "roughness_map")
 STATE_FORMAT = "subdermal-build/2"
 #: The first edition's: its images are all rendered anew, and those that are left over removed.
 OLD_STATE_FORMAT = "subdermal-build/1"
@@ -293,7 +293,9 @@ def _source(module: str) -> str:
 def _own_files(scene: Any) -> list[list[str]]:
     """The user's files and the people in a scene, each with its sha256."""
     files = [getattr(thing, "file", "") for thing in scene.objects.values()]
-    files += [getattr(material, key) for material in scene.materials.values() for key in MAPS]
+    files += [
+        file for material in scene.materials.values() for file in _maps(material.plain()).values()
+    ]
     files.append(scene.environment.map)
     for thing in scene.objects.values():
         if person := getattr(thing, "person", ""):
@@ -303,11 +305,16 @@ def _own_files(scene: Any) -> list[list[str]]:
     return [[path.name, manifest.sha256(path)] for path in paths if path.is_file()]
 
 
+def _maps(material: dict) -> dict[str, str]:
+    """The files that a material's table names, by their keys."""
+    return {key: file for key, file in material.items() if key.endswith(MAP_ENDING)}
+
+
 def _described(scene: Any) -> dict:
     """The scene's table; files by their names, since folders are nobody's business."""
     table = scene.plain()
     holders = [(entry, ("file",)) for entry in table["objects"].values()]
-    holders += [(entry, MAPS) for entry in table["materials"].values()]
+    holders += [(entry, tuple(_maps(entry))) for entry in table["materials"].values()]
     for holder, keys in (*holders, (table["environment"], ("map",))):
         for key in keys:
             if holder.get(key):

@@ -105,7 +105,8 @@ def body(item: Item) -> Body:
         proxy = part.proxy
         positions, normals = item.in_world(proxy.positions), item.turned(proxy.normals)
         albedo, value = proxy.albedo, part.material.value
-        if isinstance(value, Skin) and proxy.masks is not None:
+        mapped = "albedo_map" in part.material.maps
+        if isinstance(value, Skin) and proxy.masks is not None and not mapped:
             albedo = value.mean_albedo(proxy.masks)
         return Body(positions, normals, proxy.faces, np.asarray(albedo), proxy.smooth)
     positions, normals = item.in_world(part.positions), item.turned(part.normals)

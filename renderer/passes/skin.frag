@@ -1,4 +1,4 @@
-// Skin: colour and relief (procedural, or from a scan's maps), lamps, baked environment, transmission.
+// Skin: colour and relief (procedural, from maps, or the one over the other), lamps, baked environment, transmission.
 #include "shaders/common.glsl"
 #include "shaders/noise.glsl"
 #include "shaders/lighting.glsl"
@@ -6,8 +6,11 @@
 #include "passes/surface_out.glsl"
 uniform vec3 eye_l; uniform vec3 eye_r; uniform vec3 mouth; uniform vec3 nose;
 uniform int procedural;
-uniform int has_albedo_map; uniform int has_normal_map; uniform int has_roughness_map;
-uniform sampler2D albedo_map; uniform sampler2D normal_map; uniform sampler2D roughness_map;
+uniform int has_albedo_map; uniform int has_normal_map; uniform int has_roughness_map; uniform int has_height_map; uniform int has_specular_map;
+uniform sampler2D albedo_map; uniform sampler2D normal_map; uniform sampler2D roughness_map; uniform sampler2D height_map; uniform sampler2D specular_map;
+uniform float height_mm;  // of the height map, from black to white
+// 1: drawn, 0: left out over an albedo map
+uniform float layer_relief; uniform float layer_freckles; uniform float layer_moles; uniform float layer_mottling; uniform float layer_hair; uniform float layer_oil;
 uniform vec3 albedo_colour;
 uniform float roughness; uniform float f0; uniform float specular_strength;
 uniform vec2 lobe_roughness; uniform float lobe_share;
@@ -17,6 +20,11 @@ uniform float freckles; uniform float freckle_share; uniform float moles; unifor
 uniform float beard_tint; uniform float scalp_tint;
 uniform float pore_depth; uniform float furrow_depth; uniform float bump_height; uniform float wrinkle_depth; uniform float lip_folds;
 uniform float roughness_dry; uniform float roughness_oily;
+// Where wrinkles lie, mm (renderer/scene/material.py): vec4 and vec2 say where they set in, are whole, begin to end, have ended.
+uniform vec4 forehead_lines; uniform vec2 forehead_lines_half; uniform float forehead_lines_period;
+uniform vec2 crows_feet_place; uniform vec4 crows_feet; uniform vec2 crows_feet_angle;
+uniform vec4 lid_lines; uniform vec2 lid_lines_half; uniform float lid_lines_period;
+uniform vec2 wrinkles_behind;  // the eyes: on the forehead, around the eyes
 uniform float material_id;           // 1, 2, ...: which medium scatters below; 0: none
 uniform vec3 noise_origin;           // mm: the seed's place in the solid noise
 uniform float gaussian_falloff[6];   // 1 / (2 variance), 1/mm^2
@@ -64,11 +72,12 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
     // forehead: three faint lines that wander
     vec3 eyes = 0.5 * (eye_l + eye_r);
     vec3 f = p - eyes;
-    float brow = smoothstep(24.0, 32.0, f.y) * (1.0 - smoothstep(58.0, 66.0, f.y)) * (1.0 - smoothstep(32.0, 50.0, abs(f.x))) * step(0.0, p.z - eyes.z + 25.0);
+    float brow = smoothstep(forehead_lines.x, forehead_lines.y, f.y) * (1.0 - smoothstep(forehead_lines.z, forehead_lines.w, f.y))
+        * (1.0 - smoothstep(forehead_lines_half.x, forehead_lines_half.y, abs(f.x))) * step(0.0, p.z - eyes.z + wrinkles_behind.x);
     if (brow > 0.0) {
         vec4 warp = value_noise(vec3(q.x / 22.0, q.y / 34.0, 2.0));
         float y = f.y + 3.0 * warp.x;
-        float period = 10.5, phase = fract(y / period) - 0.5, s = phase * period;
+        float period = forehead_lines_period, phase = fract(y / period) - 0.5, s = phase * period;
         float strength = 0.5 + 0.5 * noise(vec3(q.x / 16.0, floor(y / period) * 3.1, 5.0));
         float w = 0.9, g = exp(-s * s / (w * w)) * wrinkle_depth * 0.045 * strength * brow;
         h.x -= g;
@@ -78,10 +87,11 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
     for (int k = 0; k < 2; ++k) {
         vec3 eye = k == 0 ? eye_l : eye_r;
         float side = k == 0 ? 1.0 : -1.0;
-        vec2 d = vec2(side * (p.x - eye.x) - 17.0, p.y - eye.y + 1.0);
+        vec2 d = vec2(side * (p.x - eye.x) - crows_feet_place.x, p.y - eye.y - crows_feet_place.y);
         float r = length(d), angle = atan(d.y, d.x);
-        float feet = smoothstep(2.0, 7.0, r) * (1.0 - smoothstep(12.0, 22.0, r)) * (1.0 - smoothstep(0.6, 1.1, abs(angle)));
-        if (feet > 0.0 && p.z > eye.z - 67.5) {
+        float feet = smoothstep(crows_feet.x, crows_feet.y, r) * (1.0 - smoothstep(crows_feet.z, crows_feet.w, r))
+            * (1.0 - smoothstep(crows_feet_angle.x, crows_feet_angle.y, abs(angle)));
+        if (feet > 0.0 && p.z > eye.z - wrinkles_behind.y) {
             float s = angle * 5.5 + 0.9 * noise(q / 5.0);
             float g = pow(0.5 + 0.5 * cos(s * 2.0 * PI / 1.6), 6.0) * wrinkle_depth * 0.035 * feet;
             h.x -= g;
@@ -89,10 +99,11 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
             h.yz += slope * vec2(-sin(angle) * side, cos(angle));
         }
         vec2 e = vec2(p.x - eye.x, p.y - eye.y);
-        float bag = smoothstep(-20.0, -13.0, e.y) * (1.0 - smoothstep(-9.5, -7.5, e.y)) * (1.0 - smoothstep(12.0, 18.0, abs(e.x)));
-        if (bag > 0.0 && p.z > eye.z - 67.5) {
+        float bag = smoothstep(lid_lines.x, lid_lines.y, e.y) * (1.0 - smoothstep(lid_lines.z, lid_lines.w, e.y))
+            * (1.0 - smoothstep(lid_lines_half.x, lid_lines_half.y, abs(e.x)));
+        if (bag > 0.0 && p.z > eye.z - wrinkles_behind.y) {
             float s = e.y + 0.012 * e.x * e.x + 1.2 * noise(q / vec3(9.0, 4.0, 9.0));
-            float wave = 2.0 * PI / 2.3;
+            float wave = 2.0 * PI / lid_lines_period;
             h.x += wrinkle_depth * 0.02 * bag * cos(s * wave);
             h.z -= wrinkle_depth * 0.02 * bag * sin(s * wave) * wave * 0.5;
         }
@@ -111,33 +122,51 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
     return h;
 }
 
-// Skin colour: melanin and haemoglobin as absorbances over a pale dermis, one Beer-Lambert law per pigment.
-vec3 colour(vec3 p, float pixel_mm, float pore_shade) {
+// Skin colour: melanin and haemoglobin as absorbances over a pale dermis, or more of them over what a map shows, one Beer-Lambert law
+// per pigment.
+vec3 colour(vec3 p, float pixel_mm, float pore_shade, bool mapped, vec3 map) {
     float lips = a.x, flushed = a.y, hair = a.z, eyelid = a.w, beard = beard_tint * b.z, inside = b.w;
     vec3 q = p + noise_origin;
     float broad = fbm(q / 38.0), patchy = fbm(q / 9.0 + 4.0), fine = noise(q / 2.2 + 2.0) * fade(1.5, pixel_mm);
     float m = melanin + 0.045 * broad + 0.040 * patchy + 0.018 * fine + 0.05 * eyelid + 0.060 * pore_shade;
     float h = blood + flush * flushed + 0.075 * fbm(q / 15.0 + 21.0) + 0.045 * patchy * noise(q / 5.0 + 1.0) + 0.05 * eyelid;
+    if (mapped) { m = 0.060 * pore_shade; h = 0.0; }
     // capillary mottling, strongest where the skin is flushed
-    h += mottling * (0.05 + 0.13 * flushed) * max(fbm(q / 3.2 + 40.0), 0.0) * fade(2.0, pixel_mm);
+    h += layer_mottling * mottling * (0.05 + 0.13 * flushed) * max(fbm(q / 3.2 + 40.0), 0.0) * fade(2.0, pixel_mm);
     // freckles and a few moles
     Cells c = cells(q / 7.5);
     float freckle = step(1.0 - freckle_share, unit(mix_bits(c.id ^ 3u))) * smoothstep(0.13, 0.05, c.f1 + 0.03 * noise(q * 2.0));
-    m += freckles * freckle * (1.0 - lips);
+    m += layer_freckles * freckles * freckle * (1.0 - lips);
     Cells spots = cells(q / 31.0 + 3.0);
     float mole = step(1.0 - mole_share, unit(mix_bits(spots.id ^ 7u))) * smoothstep(0.040, 0.024, spots.f1 + 0.006 * noise(q * 1.7));
-    m += moles * mole * (1.0 - lips);
+    m += layer_moles * moles * mole * (1.0 - lips);
     // hair below the surface: scalp and shaven beard, dots that merge with distance
     Cells d = cells(q / 0.85 + 8.0);
     float dots = mix(0.22, smoothstep(0.34, 0.16, d.f1), fade(0.9, pixel_mm));
+    hair *= layer_hair;
+    beard *= layer_hair;
     float rooted = clamp(hair + 0.75 * beard, 0.0, 1.0) * (0.75 + 0.25 * noise(q / 4.0));
-    vec3 skin = dermis * exp(-m * melanin_absorbance - h * blood_absorbance);
+    vec3 skin = (mapped ? map : dermis) * exp(-m * melanin_absorbance - h * blood_absorbance);
     vec3 lip_colour = lip * (1.0 + 0.10 * fbm(q / 2.5) + 0.06 * noise(q / 0.9));
-    skin = mix(skin, lip_colour, 0.88 * smoothstep(0.12, 0.85, lips + 0.10 * noise(q / 1.3)));
+    if (!mapped) skin = mix(skin, lip_colour, 0.88 * smoothstep(0.12, 0.85, lips + 0.10 * noise(q / 1.3)));
     skin *= mix(vec3(1.0), vec3(0.42, 0.40, 0.40), hair * scalp_tint) * (1.0 - rooted * vec3(0.20, 0.18, 0.15) - 0.45 * dots * rooted);
-    skin = mix(skin, vec3(0.30, 0.07, 0.06), inside);
+    if (!mapped) skin = mix(skin, vec3(0.30, 0.07, 0.06), inside);
     return skin;
 }
+
+// A normal turned by the height map: Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU", doi:10.1080/2151237X.2010.10390651.
+vec3 bumped(vec3 n) {
+    vec3 dx = dFdx(world), dy = dFdy(world);
+    vec2 du = dFdx(uv), dv = dFdy(uv);
+    float here = texture(height_map, uv).r;
+    vec2 rise = height_mm * length(model[0].xyz) * vec2(texture(height_map, uv + du).r - here, texture(height_map, uv + dv).r - here);
+    vec3 across = cross(dy, n), along = cross(n, dx);
+    float area = dot(dx, across);
+    if (area == 0.0) return n;
+    return normalize(abs(area) * n - sign(area) * (rise.x * across + rise.y * along));
+}
+
+float strength;  // of specular light, after its map
 
 vec3 transmitted(int lamp, vec3 p, vec3 n) {
     // Jimenez et al. 2010, "Real-time realistic skin translucency", doi:10.1109/MCG.2010.39
@@ -158,7 +187,7 @@ vec3 transmitted(int lamp, vec3 p, vec3 n) {
 // The share of the light that the two lobes send back, of light from a direction or from everywhere.
 float sent_back(vec3 one, vec3 two) {
     float back = mix(dot(vec2(f0, 1.0), one.xy), dot(vec2(f0, 1.0), two.xy), lobe_share);
-    return clamp(specular_strength * back, 0.0, 1.0);
+    return clamp(strength * back, 0.0, 1.0);
 }
 float sent_back(float cosine, float m) {
     return sent_back(face(cosine, m * lobe_roughness.x), face(cosine, min(m * lobe_roughness.y, 0.9)));
@@ -198,27 +227,31 @@ void main() {
     vec3 albedo = albedo_colour;
     float m = roughness;
     float shade = 0.0;
-    if (procedural == 1) {
-        vec4 h = relief(local, pixel_mm, shade);
-        vec3 slope = mat3(model) * h.yzw / length(model[0].xyz);  // relief grows with its object
-        n = normalize(smooth_n - (slope - smooth_n * dot(slope, smooth_n)));
-        albedo = colour(local, pixel_mm, shade);
-        m = mix(roughness_dry, roughness_oily, b.y) - 0.08 * a.x + 0.03 * noise((local + noise_origin) / 3.0);
-    } else {
-        if (has_albedo_map == 1) albedo = from_srgb(texture(albedo_map, uv).rgb);
-        if (has_roughness_map == 1) m = clamp(texture(roughness_map, uv).r, 0.12, 0.9);
-        if (has_normal_map == 1) {
-            vec3 dp1 = dFdx(world), dp2 = dFdy(world);
-            vec2 du1 = dFdx(uv), du2 = dFdy(uv);
-            vec3 t = dp1 * du2.y - dp2 * du1.y, s = dp2 * du1.x - dp1 * du2.x;
-            float longest = max(dot(t, t), dot(s, s));
-            if (longest > 0.0) {
-                float facing = sign(du1.x * du2.y - du1.y * du2.x);
-                vec3 map = texture(normal_map, uv).xyz * 2.0 - 1.0;
-                n = normalize(mat3(t * facing * inversesqrt(longest), s * facing * inversesqrt(longest), smooth_n) * map);
-            }
+    if (has_albedo_map == 1) albedo = from_srgb(texture(albedo_map, uv).rgb);
+    if (has_normal_map == 1) {
+        vec3 dp1 = dFdx(world), dp2 = dFdy(world);
+        vec2 du1 = dFdx(uv), du2 = dFdy(uv);
+        vec3 t = dp1 * du2.y - dp2 * du1.y, s = dp2 * du1.x - dp1 * du2.x;
+        float longest = max(dot(t, t), dot(s, s));
+        if (longest > 0.0) {
+            float facing = sign(du1.x * du2.y - du1.y * du2.x);
+            vec3 map = texture(normal_map, uv).xyz * 2.0 - 1.0;
+            n = normalize(mat3(t * facing * inversesqrt(longest), s * facing * inversesqrt(longest), smooth_n) * map);
         }
     }
+    if (has_height_map == 1) n = bumped(n);
+    if (procedural == 1) {
+        if (layer_relief > 0.0) {
+            vec4 h = relief(local, pixel_mm, shade);
+            vec3 slope = mat3(model) * h.yzw / length(model[0].xyz);  // relief grows with its object
+            n = normalize(n - (slope - n * dot(slope, n)));
+        }
+        albedo = colour(local, pixel_mm, shade, has_albedo_map == 1, albedo);
+        if (layer_oil > 0.0) m = mix(roughness_dry, roughness_oily, b.y) - 0.08 * a.x + 0.03 * noise((local + noise_origin) / 3.0);
+    }
+    if (has_roughness_map == 1) m = clamp(texture(roughness_map, uv).r, 0.12, 0.9);
+    strength = specular_strength;
+    if (has_specular_map == 1) strength *= texture(specular_map, uv).r;
 #if DOMAIN == SCREEN
     if (dot(n, v) < 0.02) n = normalize(n + v * (0.02 - dot(n, v)));
 #endif
@@ -250,7 +283,7 @@ void main() {
     vec3 dark = mix(vec3(1.0), vec3(0.35), b.w);
     float mask = material_id * step(0.5, scatters);
     out_irradiance = vec4(irradiance * dark, mask);
-    out_specular = vec4(specular_strength * specular, 1.0);
+    out_specular = vec4(strength * specular, 1.0);
     out_albedo = vec4(albedo, 1.0 - sent_back(nv, m));
     put_place(n);
     out_transmitted = vec4(mask > 0.0 ? through * (1.0 - b.w) : vec3(0.0), 1.0);

@@ -19,7 +19,7 @@ from renderer.passes.bake import Baked, bake, body
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
 from renderer.scene.graph import Contents, Item
-from renderer.scene.material import MODELS, Material, Shading, Skin
+from renderer.scene.material import LAYERS, MAPS, MODELS, Material, Shading, Skin
 from renderer.scene.model import MASKS
 
 _HALF = GL.GL_RGBA16F
@@ -27,7 +27,6 @@ _HALF = GL.GL_RGBA16F
 FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, GL.GL_R32F, _HALF)
 #: Over an atlas or points: the normal in the depth's stead, and the place in the world.
 PLACED_FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, _HALF, _HALF, GL.GL_RGBA32F)
-MAPS = ("albedo_map", "normal_map", "roughness_map")
 
 Program = Callable[..., gl.Program]
 
@@ -79,7 +78,7 @@ class Surfaces:
             if medium not in self.media:
                 self.media.append(medium)
             number = 1 + self.media.index(medium)
-        maps = {name: _map(getattr(part.material, name)) for name in MAPS}
+        maps = {name: _map(part.material.maps.get(name)) for name in MAPS}
         return Drawn(item, mesh, Baked(light.reshape(-1, 3, 3), openness[:, 0]), number, maps)
 
     def curve(self, medium: int) -> Curve:
@@ -154,12 +153,15 @@ class Surfaces:
         rng = np.random.default_rng([self.seed, 3])
         through = fits.gaussian_sum(self.curve(max(drawn.id, 1)), 6)
         nowhere = np.zeros(3)
+        layers = skin.map_layers if "albedo_map" in part.material.maps else LAYERS
         return {
             "model": drawn.item.pose,
-            "procedural": int(isinstance(material, Skin) and part.material.albedo_map is None),
+            "procedural": int(isinstance(material, Skin)),
+            **{f"layer_{name}": float(name in layers) for name in LAYERS},
             "noise_origin": rng.uniform(100, 900, 3),
             **{name: marks.get(name, nowhere) for name in ("eye_l", "eye_r", "mouth", "nose")},
-            **{f"has_{name}": getattr(part.material, name) is not None for name in MAPS},
+            **{f"has_{name}": name in part.material.maps for name in MAPS},
+            "height_mm": material.height_mm,
             **drawn.maps,
             "albedo_colour": material.albedo,
             "roughness": material.roughness,
@@ -185,7 +187,17 @@ class Surfaces:
             "pore_depth": skin.pores,
             "furrow_depth": skin.furrows,
             "bump_height": skin.bumps,
-            "wrinkle_depth": skin.wrinkles,
+            "wrinkle_depth": skin.wrinkles if "eye_l" in marks else 0.0,
+            "forehead_lines": skin.forehead_lines_mm,
+            "forehead_lines_half": skin.forehead_lines_half_mm,
+            "forehead_lines_period": skin.forehead_lines_period_mm,
+            "crows_feet_place": skin.crows_feet_place_mm,
+            "crows_feet": skin.crows_feet_mm,
+            "crows_feet_angle": skin.crows_feet_rad,
+            "lid_lines": skin.lid_lines_mm,
+            "lid_lines_half": skin.lid_lines_half_mm,
+            "lid_lines_period": skin.lid_lines_period_mm,
+            "wrinkles_behind": skin.wrinkles_behind_mm,
             "lip_folds": skin.lip_folds,
             "roughness_dry": skin.roughness_dry,
             "roughness_oily": skin.roughness_oily,
@@ -249,11 +261,15 @@ def _eye(item: Item, baked: Baked) -> Drawn:
 
 
 def _map(image: np.ndarray | None) -> gl.Texture:
-    """A material's map, (H, W) or (H, W, 3) uint8, row 0 at the top; one texel for none."""
+    """A material's map, see renderer.scene.model.Surface; one texel for none."""
     if image is None:
         return gl.Texture(1, 1, GL.GL_RGBA8)
+    smooth = {"linear": True, "mipmap": True, "repeat": True}
+    if image.dtype != np.uint8:
+        height, width = image.shape
+        return gl.Texture(width, height, GL.GL_R32F, data=image[::-1, :, None], **smooth)
     if image.ndim == 2:
         image = np.repeat(image[..., None], 3, axis=2)
     rgba = np.dstack([image, np.full(image.shape[:2], 255, dtype=np.uint8)])[::-1]
     height, width = rgba.shape[:2]
-    return gl.Texture(width, height, GL.GL_RGBA8, linear=True, data=rgba, mipmap=True, repeat=True)
+    return gl.Texture(width, height, GL.GL_RGBA8, data=rgba, **smooth)

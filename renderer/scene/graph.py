@@ -23,15 +23,13 @@ from renderer.scene.picture import Picture
 class SurfaceMaterial(pyrender.Material):
     """Our material and its maps, as a pyrender material.
 
-    value: renderer.scene.material.Material; albedo_map, normal_map (H, W, 3) and roughness_map
-    (H, W), uint8, row 0 at the top, or None.
+    value: renderer.scene.material.Material; maps: as renderer.scene.model.Surface has them.
     """
 
-    def __init__(self, value: Material, albedo_map=None, normal_map=None, roughness_map=None):
+    def __init__(self, value: Material, maps: dict[str, np.ndarray] | None = None):
         super().__init__(name=type(value).__name__)
         self.value = value
-        self.albedo_map, self.normal_map = albedo_map, normal_map
-        self.roughness_map = roughness_map
+        self.maps = maps or {}
 
     @property
     def is_transparent(self) -> bool:
@@ -124,9 +122,7 @@ class SceneGraph(pyrender.Scene):
     def add_model(self, model: Model, pose: np.ndarray, name: str | None = None) -> None:
         """A head or another object: its surface, its eyes, its hair, in one mesh."""
         skin = model.surface
-        material = SurfaceMaterial(
-            model.material, skin.albedo_map, skin.normal_map, skin.roughness_map
-        )
+        material = SurfaceMaterial(model.material, skin.maps)
         parts: list[pyrender.Primitive] = [SurfacePrimitive(skin, material, model.landmarks)]
         parts += [EyePrimitive(eye) for eye in model.eyes]
         if model.strands is not None:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
 from renderer.errors import InputError
-from renderer.parameters import Parameters, parameter
+from renderer.parameters import Parameters, parameter, weights
 
 #: What a head's masks say, in the order of their columns: how much of each, in [0, 1].
 MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
+#: A material's maps, image files: albedo in sRGB, normals in tangent space, the others grey.
+MAPS = ("albedo_map", "normal_map", "roughness_map", "height_map", "specular_map")
+#: What of procedural skin can lie over an albedo map.
+LAYERS = ("relief", "freckles", "moles", "mottling", "hair", "oil")
 _SHARE = {"low": 0.0, "high": 1.0}
 # Means of the shader's noises, by integration: of a freckle's cell, of the positive part of four
 # octaves, of the dots below the surface.
@@ -26,8 +31,9 @@ class Material(Parameters):
     medium: a preset's name or a table of coefficients (renderer.optics.media), "" for a surface
     that does not scatter. thickness: "solid", or that of a sheet of the medium in mm. coatings:
     layers above it, outermost first, each a table with `medium` and `thickness_mm`. albedo is
-    linear, the share of diffuse light that comes back. Maps are image files (a scan brings its
-    own): albedo in sRGB, normals in tangent space, roughness grey.
+    linear, the share of diffuse light that comes back. Maps are image files over the surface's
+    texture coordinates (a scan brings its own): MAPS says which. height_map: white stands height_mm
+    above black; specular_map: of `specular`.
     """
 
     kind: ClassVar[str] = "plain"
@@ -65,10 +71,15 @@ class Material(Parameters):
     albedo_map: str = ""
     normal_map: str = ""
     roughness_map: str = ""
+    height_map: str = ""
+    specular_map: str = ""
+    height_mm: float = parameter(
+        1.0, unit="mm from black to white", low=-1000.0, high=1000.0, source="the map's own"
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("albedo_map", "normal_map", "roughness_map"):
+        for name in MAPS:
             value = getattr(self, name)
             if not isinstance(value, str):
                 raise InputError(f"{self.where(name)} is {value!r:.60}; expected a file")
@@ -113,14 +124,44 @@ class Material(Parameters):
         return bool(self.medium)
 
 
+def _band(*default: float) -> Any:
+    """Where something sets in, is whole, begins to end, has ended."""
+    return parameter(default, unit="mm", low=-500.0, high=500.0, source="by eye")
+
+
+def _period(default: float) -> Any:
+    return parameter(default, unit="mm", low=0.1, high=100.0, source="by eye")
+
+
+_BANDS = (
+    "forehead_lines_mm",
+    "forehead_lines_half_mm",
+    "crows_feet_mm",
+    "crows_feet_rad",
+    "lid_lines_mm",
+    "lid_lines_half_mm",
+)
+
+
 @dataclass(frozen=True)
 class Skin(Material):
     """Procedural skin: pigments, pores, furrows and hair below the surface over the solid noise.
 
-    The masks of a head (lips, flush, beard, ...) say where; `relief` scales its heights.
+    The masks of a head (lips, flush, beard, ...) say where; on a surface that brings none, `masks`
+    says how much of each there is everywhere. map_layers: those of LAYERS that also lie over an
+    albedo map, which stands for the pigments and the lips.
+
+    Wrinkles lie between heights in mm, over which they set in and end: forehead_lines_mm above the
+    eyes and forehead_lines_half_mm to the sides; crows_feet_mm from a place outwards of and above
+    each eye, within crows_feet_rad of the horizontal; lid_lines_mm above and lid_lines_half_mm
+    beside each eye. Those of the forehead and those of the eyes lie on what is not farther behind
+    the eyes than wrinkles_behind_mm.
     """
 
     kind: ClassVar[str] = "skin"
+
+    map_layers: tuple[str, ...] = LAYERS
+    masks: dict[str, float] = field(default_factory=dict)
 
     melanin: float = parameter(
         0.20, unit="optical depth", low=0.0, high=8.0, source="chosen by eye; darker is more"
@@ -159,6 +200,38 @@ class Skin(Material):
     roughness_oily: float = parameter(
         0.27, unit="Beckmann slope", low=0.02, high=1.0, source="chosen by eye"
     )
+
+    forehead_lines_mm: tuple[float, float, float, float] = _band(24.0, 32.0, 58.0, 66.0)
+    forehead_lines_half_mm: tuple[float, float] = _band(32.0, 50.0)
+    forehead_lines_period_mm: float = _period(10.5)
+    crows_feet_place_mm: tuple[float, float] = parameter(
+        (17.0, -1.0), unit="mm outwards and above", low=-50.0, high=50.0, source="by eye"
+    )
+    crows_feet_mm: tuple[float, float, float, float] = _band(2.0, 7.0, 12.0, 22.0)
+    crows_feet_rad: tuple[float, float] = parameter(
+        (0.6, 1.1), unit="radians", low=0.0, high=3.2, source="by eye"
+    )
+    lid_lines_mm: tuple[float, float, float, float] = _band(-20.0, -13.0, -9.5, -7.5)
+    lid_lines_half_mm: tuple[float, float] = _band(12.0, 18.0)
+    lid_lines_period_mm: float = _period(2.3)
+    wrinkles_behind_mm: tuple[float, float] = parameter(
+        (25.0, 67.5), unit="mm: forehead, eyes", low=0.0, high=500.0, source="by eye"
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in self.map_layers:
+            if name not in LAYERS:
+                known = ", ".join(LAYERS)
+                raise InputError(
+                    f"{self.where('map_layers')} has {name!r:.60}; expected of {known}"
+                )
+        shares = weights(self.where("masks"), self.masks, "masks", 0, 1, MASKS)
+        object.__setattr__(self, "masks", shares)
+        for name in _BANDS:
+            band = getattr(self, name)
+            if any(low >= high for low, high in pairwise(band)):
+                raise InputError(f"{self.where(name)} is {band}; expected places that rise")
 
     def mean_albedo(self, masks: np.ndarray) -> np.ndarray:
         """Linear albedo (N, 3) at the scale of bounced light, from masks (N, 8).
@@ -231,11 +304,11 @@ class Shading(Material):
                 f"{self.where('medium')} is {self.medium!r:.60}; expected none: light does not "
                 "scatter below an illumination model"
             )
-        if self.normal_map or self.roughness_map:
-            raise InputError(
-                f"{self.where('normal_map')} and roughness_map are not for kind 'shading'; "
-                "expected albedo_map alone"
-            )
+        for name in MAPS[1:]:
+            if getattr(self, name):
+                raise InputError(
+                    f"{self.where(name)} is not for kind 'shading'; expected albedo_map alone"
+                )
         most = max(map(sum, zip(self.albedo, self.k_r, self.k_t, strict=True)))
         if most > 1 + 1e-9:
             raise InputError(

@@ -19,8 +19,9 @@ class Surface:
     """The scattering surface.
 
     positions, normals (N, 3) float32; uvs (N, 2); faces (M, 3). masks: (N, 8) in [0, 1], columns
-    MASKS. proxy: what rays are traced against. maps: albedo (H, W, 3) uint8 sRGB, normal (H, W, 3)
-    uint8 tangent space, roughness (H, W) uint8; None: procedural.
+    MASKS. proxy: what rays are traced against. maps: by the names of MAPS, albedo (H, W, 3) uint8
+    sRGB, normal (H, W, 3) uint8 tangent space, roughness and specular (H, W) uint8, height (H, W)
+    float32 in [0, 1]; row 0 at the top.
     """
 
     positions: np.ndarray
@@ -29,9 +30,7 @@ class Surface:
     faces: np.ndarray
     masks: np.ndarray
     proxy: Proxy
-    albedo_map: np.ndarray | None = None
-    normal_map: np.ndarray | None = None
-    roughness_map: np.ndarray | None = None
+    maps: dict[str, np.ndarray] = field(default_factory=dict)
     base_colour: tuple[float, float, float] | None = None  # linear albedo where there is no map
     scatters: np.ndarray | None = (
         None  # (N,) 1 where the material scatters, 0 for eyes and teeth of a scan; None: all of it

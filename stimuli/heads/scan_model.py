@@ -122,6 +122,11 @@ def scan_model(scan) -> Model:
     else:
         proxy = Proxy(positions, normals, faces, albedo, sparse.identity(len(used), format="csr"))
     uvs = np.zeros((len(used), 2)) if scan.uvs is None else scan.uvs[used]
+    own = {
+        "albedo_map": scan.albedo,
+        "normal_map": scan.normal_map,
+        "roughness_map": scan.roughness,
+    }
     surface = Surface(
         positions.astype(np.float32),
         normals.astype(np.float32),
@@ -129,9 +134,7 @@ def scan_model(scan) -> Model:
         faces.astype(np.uint32),
         np.zeros((len(used), len(MASKS)), dtype=np.float32),
         proxy,
-        scan.albedo,
-        scan.normal_map,
-        scan.roughness,
+        {name: image for name, image in own.items() if image is not None},
         tuple(colour),
         scatters,
     )

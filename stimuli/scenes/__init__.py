@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from renderer.scene.graph import SceneGraph
 
 _FILES = (("environment", "map"),)
-_MATERIAL_FILES = ("albedo_map", "normal_map", "roughness_map")
+MAP_ENDING = "_map"  # of a material's keys that name files
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,12 @@ def _file_keys(table: dict[str, Any]) -> Iterator[tuple[dict, str]]:
     for section, key in _FILES:
         if isinstance(table.get(section), dict) and key in table[section]:
             yield table[section], key
-    for section, keys in (("objects", ("file",)), ("materials", _MATERIAL_FILES)):
+    for section in ("objects", "materials"):
         entries = table.get(section)
         for entry in entries.values() if isinstance(entries, dict) else ():
             if isinstance(entry, dict):
-                yield from ((entry, key) for key in keys if key in entry)
+                yield from ((entry, key) for key in entry if _names_file(section, key))
+
+
+def _names_file(section: str, key: str) -> bool:
+    return key == "file" if section == "objects" else key.endswith(MAP_ENDING)

@@ -18,6 +18,7 @@ from renderer.scene import (
     shapes,
 )
 from renderer.scene.graph import SceneGraph
+from renderer.scene.material import MAPS, Skin
 from stimuli.errors import InputError
 from stimuli.heads import load_person, load_scan
 from stimuli.scenes import Stage
@@ -61,10 +62,59 @@ def _model(thing: objects.Object, scene: Scene, seed: int):
             if own is not None and material.albedo == Material().albedo:
                 material = replace(material, albedo=tuple(float(v) for v in own))
         model = replace(head.model, material=material)
-        return model, head.provenance, head.licences, list(head.notes)
+        return _dressed(model), head.provenance, head.licences, list(head.notes)
     if isinstance(thing, objects.Mesh):
-        return _mesh(thing.file, thing.unit, thing.up, material), {"file": thing.file}, [], []
-    return _shape(_generated(thing, material), material), {"shape": thing.shape}, [GENERATED], []
+        model = _mesh(thing.file, thing.unit, thing.up, material)
+        return _dressed(model), {"file": thing.file}, [], []
+    model = _shape(_generated(thing, material), material)
+    return _dressed(model), {"shape": thing.shape}, [GENERATED], []
+
+
+def _dressed(model: Model) -> Model:
+    """The model with its material's own maps and, where the surface brings none, masks."""
+    material, surface = model.material, model.surface
+    files = {name: getattr(material, name) for name in MAPS if getattr(material, name)}
+    own = {name: _image(file, name) for name, file in files.items()}
+    surface = replace(surface, maps={**surface.maps, **own})
+    proxy = surface.proxy
+    if isinstance(material, Skin) and not surface.masks.any():
+        everywhere = np.array([[material.masks.get(name, 0.0) for name in MASKS]], np.float32)
+        surface = replace(surface, masks=np.repeat(everywhere, len(surface.masks), axis=0))
+        proxy = replace(proxy, masks=np.repeat(everywhere, len(proxy.positions), axis=0))
+    if "albedo_map" in own:
+        proxy = replace(proxy, albedo=_mean_albedo(own["albedo_map"], surface))
+    return replace(model, surface=replace(surface, proxy=proxy))
+
+
+def _image(file: str, name: str) -> np.ndarray:
+    """A map's texels, see renderer.scene.model.Surface."""
+    from PIL import Image
+
+    try:
+        with Image.open(file) as image:
+            if name == "height_map":
+                grey = np.asarray(image if image.mode.startswith("I") else image.convert("L"))
+                return (grey / (65535 if image.mode.startswith("I") else 255)).astype(np.float32)
+            coloured = name in ("albedo_map", "normal_map")
+            return np.asarray(image.convert("RGB" if coloured else "L"))
+    except OSError as error:
+        words = "no such file" if isinstance(error, FileNotFoundError) else "cannot be read"
+        raise InputError(f"{file}: {words}; expected an image for {name}") from error
+
+
+def _mean_albedo(image: np.ndarray, surface: Surface, size: int = 64) -> np.ndarray:
+    """Linear albedo (P, 3) at the proxy's vertices: of the map in size x size texels, since bounced
+    light asks for no more.
+    """
+    from PIL import Image
+
+    small = np.asarray(Image.fromarray(image).resize((size, size), Image.Resampling.BOX)) / 255
+    linear = np.where(small <= 0.04045, small / 12.92, ((small + 0.055) / 1.055) ** 2.4)
+    at = np.floor((surface.uvs % 1.0) * size).astype(int).clip(0, size - 1)
+    shown = linear[size - 1 - at[:, 1], at[:, 0]]
+    share = surface.proxy.to_full.T
+    total = np.maximum(share @ np.ones(len(shown)), 1e-9)
+    return (share @ shown) / total[:, None]
 
 
 #: Generated shapes are finer than their light needs: noise is averaged over more neighbours.
@@ -96,7 +146,7 @@ def _shape(shape: shapes.Shape, material: Material) -> Model:
         shape.faces.astype(np.uint32),
         np.zeros((count, len(MASKS)), np.float32),
         proxy,
-        albedo_map=None if shape.colours is None else _atlas(shape),
+        maps={} if shape.colours is None else {"albedo_map": _atlas(shape)},
         scatters=None if material.scatters else np.zeros(count),
     )
     return Model(surface, (), None, {}, material)

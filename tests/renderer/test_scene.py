@@ -104,10 +104,14 @@ def test_what_is_wrong_is_named_in_one_line(patch, message):
 
 def test_files_are_looked_for_beside_the_scene(tmp_path):
     file = tmp_path / "own.toml"
-    file.write_text('[objects.a]\nshape = "mesh"\nfile = "a.ply"\n[environment]\nmap = "e.hdr"\n')
+    file.write_text(
+        '[objects.a]\nshape = "mesh"\nfile = "a.ply"\n[environment]\nmap = "e.hdr"\n'
+        '[materials.a]\nheight_map = "h.png"\n'
+    )
     table = scenes.load_table(file)
     assert table["objects"]["a"]["file"] == str(tmp_path / "a.ply")
     assert table["environment"]["map"] == str(tmp_path / "e.hdr")
+    assert table["materials"]["a"]["height_map"] == str(tmp_path / "h.png")
     with pytest.raises(InputError, match="no such file"):
         scenes.load_table(tmp_path / "gone.toml")
     file.write_text("[objects")
