@@ -59,7 +59,7 @@ def simulations(effort: float, seed: int) -> dict:
     """Rings of every albedo: {(diffuse, A): (alpha, share (rings,), error (rings,), total, its
     error)}.
     """
-    found = {}
+    simulated = {}
     for diffuse in (False, True):
         for i, A in enumerate(
             tqdm(ALBEDOS, desc="diffuse" if diffuse else "searchlight", unit="albedo", disable=None)
@@ -72,25 +72,25 @@ def simulations(effort: float, seed: int) -> dict:
                 "diffuse" if diffuse else "searchlight",
                 EDGES,
             )
-            found[diffuse, A] = (
+            simulated[diffuse, A] = (
                 alpha,
                 result.R * result.area_mm2,
                 result.R_error * result.area_mm2,
                 result.diffuse_reflectance,
                 result.diffuse_reflectance_error,
             )
-    return found
+    return simulated
 
 
 def judge(
-    name: str, found: dict, shortest: float, longest: float, own_length: bool, weight: str
+    name: str, simulated: dict, shortest: float, longest: float, own_length: bool, weight: str
 ) -> np.ndarray:
     """Rows of (best s, its error, the fit's s, its error, rings that count), one an albedo: (99,
     5).
     """
     fit, rows = burley.PARAMETRISATIONS[name], []
     for A in ALBEDOS:
-        alpha, share, error, *_ = found[name == "diffuse", A]
+        alpha, share, error, *_ = simulated[name == "diffuse", A]
         length = (
             float(np.sqrt(grosjean_D(1 - alpha, alpha) / (1 - alpha))) if name == "dmfp" else 1.0
         )
@@ -132,8 +132,8 @@ def main() -> None:
         help="draws the photons; every simulation has a seed of its own that follows from it",
     )
     arguments = parser.parse_args()
-    found = simulations(arguments.effort, arguments.seed)
-    off = [(total - A) / error for (_, A), (*_, total, error) in found.items()]
+    simulated = simulations(arguments.effort, arguments.seed)
+    off = [(total - A) / error for (_, A), (*_, total, error) in simulated.items()]
     print(
         f"totals against Chandrasekhar: rms {np.sqrt(np.mean(np.square(off))):.2f}, worst "
         f"{np.abs(off).max():.1f} standard errors of {len(off)} totals"
@@ -149,7 +149,7 @@ def main() -> None:
         + "".join(f"{f'{best} / {fit}':>14}" for best, fit in PUBLISHED.values())
     )
     for shortest, longest, own, weight in READINGS:
-        judged = [judge(name, found, shortest, longest, own, weight) for name in PUBLISHED]
+        judged = [judge(name, simulated, shortest, longest, own, weight) for name in PUBLISHED]
         cells = "".join(
             f"{f'{100 * rows[:, 1].mean():.1f} / {100 * rows[:, 3].mean():.1f}':>14}"
             for rows in judged
@@ -159,7 +159,7 @@ def main() -> None:
         print(f"{radii:<18}{weight:<17}{cells}{last:>8.1f}")
     print("\nby albedo, first reading: error in % with the best s / with the fit")
     print(f"{'A':<6}" + "".join(f"{name:>14}" for name in PUBLISHED))
-    judged = [judge(name, found, *READINGS[0]) for name in PUBLISHED]
+    judged = [judge(name, simulated, *READINGS[0]) for name in PUBLISHED]
     for A in (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.97, 0.98, 0.99):
         at = round(A * 100) - 1
         print(

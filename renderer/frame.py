@@ -81,21 +81,21 @@ class Renderer:
             )
         if supersample not in (1, 2, 3, 4):
             raise InputError(f"supersample is {supersample!r}; expected 1, 2, 3 or 4")
-        found = graphs.contents(scene)
-        if not found.surfaces:
+        contents = graphs.contents(scene)
+        if not contents.surfaces:
             raise InputError("the scene has no surface; expected at least one mesh")
         self.scene, self.size, self.supersample, self.seed = scene, size, supersample, seed
         give_back()  # what the making of the scene has freed
         self.context = gl.Context()
         try:
             self._programs: dict = {}
-            self.surroundings = Surroundings(found.environment)
-            self.surfaces = Surfaces(found, found.lights, self.surroundings, rays, seed)
+            self.surroundings = Surroundings(contents.environment)
+            self.surfaces = Surfaces(contents, contents.lights, self.surroundings, rays, seed)
             base = {drawn.item.mesh: drawn for drawn in self.surfaces.surfaces}
-            self.hair = [Hair(item, base[item.mesh]) for item in found.strands]
+            self.hair = [Hair(item, base[item.mesh]) for item in contents.strands]
             points = [self.surfaces.vertices(), *(h.points.reshape(-1, 3) for h in self.hair)]
             everything = np.vstack(points)
-            self.lamps = Lamps(found.lights, everything, shadow_map)
+            self.lamps = Lamps(contents.lights, everything, shadow_map)
             self._draw_shadows()
         except BaseException:
             self.close()

@@ -226,13 +226,13 @@ def scenes_of(study: Study) -> dict[str, Any]:
     from renderer.errors import InputError as SceneError
     from stimuli.scenes import read_scene
 
-    found = {}
+    scenes = {}
     for cell in study.cells:
         try:
-            found[cell.name] = read_scene(study.scene_of(cell), f"{cell.name}: scene")
+            scenes[cell.name] = read_scene(study.scene_of(cell), f"{cell.name}: scene")
         except (SceneError, InputError) as error:
             raise InputError(f"study {study.name}: {error}") from error
-    return found
+    return scenes
 
 
 def samples_per_pixel(samples: np.ndarray) -> float:
@@ -250,12 +250,12 @@ def commit() -> str | None:
         return subprocess.run(["git", "-C", str(_ROOT), *args], capture_output=True, text=True)
 
     try:
-        found = git("rev-parse", "--show-toplevel", "--verify", "HEAD")
+        run = git("rev-parse", "--show-toplevel", "--verify", "HEAD")
     except FileNotFoundError:
         return None
-    if found.returncode:
+    if run.returncode:
         return None
-    top, head = found.stdout.splitlines()
+    top, head = run.stdout.splitlines()
     if Path(top).resolve() != _ROOT:
         return None
     return head + (
@@ -331,11 +331,11 @@ def _place(scene: Any) -> str:
 
 def _distinct(entries: Iterable) -> list:
     """The entries without repetition, in order (they need not be hashable)."""
-    found = []
+    distinct = []
     for entry in entries:
-        if entry not in found:
-            found.append(entry)
-    return found
+        if entry not in distinct:
+            distinct.append(entry)
+    return distinct
 
 
 def _by_cell(group: list[Stimulus]) -> list[list[Stimulus]]:

@@ -24,10 +24,10 @@ def part(name: str | Path, folder: Path, what: str, beside: Path | None = None) 
         raise InputError(f"{what} is {name!r:.60}; expected a name or a file")
     path = Path(name)
     if path.suffix == ".toml" or len(path.parts) > 1:
-        found = path if beside is None or path.is_absolute() else beside / path
-        if not found.is_file():
-            raise InputError(f"{what} {str(found)!r}: no such file")
-        return found
+        file = path if beside is None or path.is_absolute() else beside / path
+        if not file.is_file():
+            raise InputError(f"{what} {str(file)!r}: no such file")
+        return file
     known = names(folder)
     if path.name not in known:
         near = get_close_matches(path.name, known, 1)

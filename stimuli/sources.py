@@ -34,41 +34,41 @@ def _imports(path: Path) -> frozenset[str]:
 def _file(name: str) -> Path | None:
     """The file of a dotted name, None where it names something inside a module."""
     path = ROOT.joinpath(*name.split("."))
-    for found in (path.with_suffix(".py"), path / "__init__.py"):
-        if found.is_file():
-            return found
+    for file in (path.with_suffix(".py"), path / "__init__.py"):
+        if file.is_file():
+            return file
     return None
 
 
 def modules(*names: str) -> set[Path]:
     """The files of modules and of all that they import; the table of techniques is not followed."""
-    found: set[Path] = set()
+    files: set[Path] = set()
     waiting = list(names)
     while waiting:
         path = _file(waiting.pop())
-        if path is None or path in found or path == ROOT / "renderer/techniques/__init__.py":
+        if path is None or path in files or path == ROOT / "renderer/techniques/__init__.py":
             continue
-        found.add(path)
+        files.add(path)
         waiting += _imports(path)
-    return found
+    return files
 
 
 def shared() -> set[Path]:
     """The files behind every image, whatever its technique."""
-    found = modules(*SHARED)
+    files = modules(*SHARED)
     for folder in ("renderer/passes", "renderer/shaders"):
         for pattern in SHADERS:
-            found.update((ROOT / folder).glob(pattern))
-    found.update(path for path in (ROOT / "stimuli/heads").rglob("*") if path.suffix == ".npz")
-    return found
+            files.update((ROOT / folder).glob(pattern))
+    files.update(path for path in (ROOT / "stimuli/heads").rglob("*") if path.suffix == ".npz")
+    return files
 
 
 def of_technique(module: str) -> set[Path]:
     """The files of a technique's module: what it imports, and the shaders named as its modules."""
-    found = modules(module)
-    beside = {path.stem for path in found if path.parent == ROOT / "renderer/techniques"}
+    files = modules(module)
+    beside = {path.stem for path in files if path.parent == ROOT / "renderer/techniques"}
     folder = ROOT / "renderer/techniques"
-    return found | {p for pattern in SHADERS for p in folder.glob(pattern) if p.stem in beside}
+    return files | {p for pattern in SHADERS for p in folder.glob(pattern) if p.stem in beside}
 
 
 def digest(module: str) -> str:

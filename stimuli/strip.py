@@ -19,12 +19,12 @@ CROP = re.compile(r"(\d+)x(\d+)\+(\d+)\+(\d+)")
 
 def parse_crop(text: str) -> tuple[int, int, int, int]:
     """(x, y, width, height) from "WIDTHxHEIGHT+X+Y", ImageMagick's geometry."""
-    found = CROP.fullmatch(text)
-    if not found or not int(found[1]) or not int(found[2]):
+    match = CROP.fullmatch(text)
+    if not match or not int(match[1]) or not int(match[2]):
         raise InputError(
             f"the crop is {text!r}; expected WIDTHxHEIGHT+X+Y, such as 400x400+760+480"
         )
-    width, height, x, y = map(int, found.groups())
+    width, height, x, y = map(int, match.groups())
     return x, y, width, height
 
 

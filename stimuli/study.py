@@ -291,8 +291,8 @@ def with_head(scene: dict, name: str, unit: str | None = None, up: str | None = 
     own = scene.get("objects", {}).get(subject, {})
     place = {key: own[key] for key in ("position_mm", "rotation_deg", "scale") if key in own}
     if Path(name).suffix:
-        found = {"unit": unit, "up": up}
-        shape = {"shape": "scan", "file": name, **{k: v for k, v in found.items() if v}}
+        options = {"unit": unit, "up": up}
+        shape = {"shape": "scan", "file": name, **{k: v for k, v in options.items() if v}}
     else:
         shape = {"shape": "person", "person": name}
     objects = {**scene.get("objects", {}), subject: {**place, **shape}}
@@ -343,17 +343,17 @@ def _factors(table: Table, rendered: bool) -> tuple[Factor, ...]:
     framings = [Table(f, table.source, f"{table.at('framings')}[0]") for f in (HEAD_SHOT,)]
     if "framings" in table.value:
         framings = table.tables("framings", least=1)
-    found = [Factor(FRAMING, "Framing", _levels(framings, FRAMING, rendered))]
+    factors = [Factor(FRAMING, "Framing", _levels(framings, FRAMING, rendered))]
     entries = table.tables("factors", least=0) if "factors" in table.value else []
     for entry in entries:
         name = entry.name("name")
         if name in RESERVED:
             raise entry.fault("name", name, f"another name than {', '.join(sorted(RESERVED))}")
         levels = entry.tables("levels", least=1)
-        found.append(Factor(name, entry.text("label"), _levels(levels, name, rendered)))
+        factors.append(Factor(name, entry.text("label"), _levels(levels, name, rendered)))
         entry.end()
     refuse_doubles(entries, "name")
-    return tuple(found)
+    return tuple(factors)
 
 
 def _levels(tables: list[Table], factor: str, rendered: bool) -> tuple[Level, ...]:

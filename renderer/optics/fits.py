@@ -58,12 +58,12 @@ def gaussian_sum(curve: Curve, terms: int) -> GaussianFit:
     roots = [np.sqrt(np.gradient(x) / (x[-1] - x[0])) for x in places]
 
     def weights(log_v: np.ndarray) -> np.ndarray:
-        found = np.empty((terms, curve.channels))
+        solved = np.empty((terms, curve.channels))
         for c, (x, goal, root) in enumerate(zip(places, goals, roots, strict=True)):
             columns = gaussians.line_integral(x, np.inf, np.exp(log_v), np.eye(terms))
             heavy = np.vstack([root[:, None] * columns, 100 * np.ones(terms)])
-            found[:, c] = nnls(heavy, np.append(root * goal, 100.0), maxiter=500)[0]
-        return found / found.sum(axis=0)
+            solved[:, c] = nnls(heavy, np.append(root * goal, 100.0), maxiter=500)[0]
+        return solved / solved.sum(axis=0)
 
     def residual(log_v: np.ndarray) -> np.ndarray:
         w = weights(log_v)
@@ -80,9 +80,11 @@ def gaussian_sum(curve: Curve, terms: int) -> GaussianFit:
     for inset in (0.0, 0.12):
         width = (high - low) * (1 - 2 * inset)
         start = low + (high - low) * inset + width * (np.arange(terms) + 0.5) / terms
-        found = least_squares(residual, start, bounds=(low - 4, high + 3), max_nfev=60, xtol=1e-6)
-        if best is None or found.cost < best.cost:
-            best = found
+        solution = least_squares(
+            residual, start, bounds=(low - 4, high + 3), max_nfev=60, xtol=1e-6
+        )
+        if best is None or solution.cost < best.cost:
+            best = solution
     log_v = np.sort(best.x)
     fit = GaussianFit(np.exp(log_v), weights(log_v), np.zeros(curve.channels))
     return GaussianFit(fit.variance_mm2, fit.weights, edge_error(curve, fit.edge))
@@ -117,8 +119,8 @@ def burley_distance(curve: Curve) -> BurleyFit:
             return float(np.trapezoid((got - goal) ** 2, x))
 
         middle = np.log(curve.mean_radius()[c] / burley.MEAN_RADIUS)
-        found = minimize_scalar(miss, bounds=(middle - 2.5, middle + 2.5), method="bounded")
-        distances.append(float(np.exp(found.x)))
+        minimum = minimize_scalar(miss, bounds=(middle - 2.5, middle + 2.5), method="bounded")
+        distances.append(float(np.exp(minimum.x)))
     fit = BurleyFit(np.array(distances), np.zeros(curve.channels))
     return BurleyFit(fit.distance_mm, edge_error(curve, fit.edge))
 
@@ -189,7 +191,7 @@ def dipole(curve: Curve) -> DipoleFit:
     """The dipole of each channel nearest to a curve: mean free path and reduced albedo are free."""
     from scipy.optimize import minimize
 
-    found = []
+    solutions = []
     for c in range(curve.channels):
         x = curve.positions(c, 121)
         goal = curve.edge(x)[:, c]
@@ -199,7 +201,7 @@ def dipole(curve: Curve) -> DipoleFit:
             return float(np.trapezoid((one.edge(x)[:, 0] - goal) ** 2, x))
 
         start = [np.log(0.5 * curve.mean_radius()[c]), 2.0]
-        found.append(minimize(miss, start, method="Nelder-Mead", options={"maxiter": 120}).x)
-    log_mfp, logit = np.transpose(found)
+        solutions.append(minimize(miss, start, method="Nelder-Mead", options={"maxiter": 120}).x)
+    log_mfp, logit = np.transpose(solutions)
     fit = _dipole(np.exp(log_mfp), 1 / (1 + np.exp(-logit)))
     return DipoleFit(fit.real_mm, fit.virtual_mm, fit.sigma_tr, edge_error(curve, fit.edge))

@@ -167,7 +167,7 @@ def fit(r_mm, target, terms: int, total: float | None) -> Fit:
         # A term that the profile does not need would run away: variances stay near the profile's
         # own.
         bounds = np.repeat([low - 4, -60.0], terms), np.repeat([high + 3, 60.0], terms)
-        found = least_squares(
+        solution = least_squares(
             residual,
             np.clip(np.concatenate([start, first]), *bounds),
             bounds=bounds,
@@ -175,8 +175,8 @@ def fit(r_mm, target, terms: int, total: float | None) -> Fit:
             xtol=1e-11,
             ftol=1e-11,
         )
-        if found.success and (best is None or found.cost < best.cost):
-            best = found
+        if solution.success and (best is None or solution.cost < best.cost):
+            best = solution
     if best is None:
         raise ArithmeticError(f"the fit of {terms} Gaussians did not converge")
     order = np.argsort(best.x[:terms])

@@ -100,10 +100,10 @@ def read(value: str | Mapping[str, Any], where: str = "medium") -> Stack | Gauss
     if isinstance(value, str):
         key = value.lower().replace("-", "_").replace(" ", "_")
         key = ALIASES.get(key, key)
-        found = PUBLISHED.get(key) or STACKS.get(key)
-        if found is None:
+        preset = PUBLISHED.get(key) or STACKS.get(key)
+        if preset is None:
             raise InputError(f"{where} is {value!r}; expected one of {', '.join(names())}")
-        return found
+        return preset
     if not isinstance(value, Mapping):
         raise InputError(f"{where} is {value!r:.60}; expected a preset's name or a table")
     try:
@@ -155,12 +155,12 @@ def _medium(table: Mapping[str, Any], where: str) -> Medium:
 
 
 def _gaussians(table: Mapping[str, Any], where: str) -> GaussianCurve:
-    found = table["gaussians"]
-    if not isinstance(found, Mapping):
-        raise InputError(f"{where}.gaussians is {found!r:.60}; expected variance_mm2 and weights")
-    refuse_unknown(found, ("variance_mm2", "weights"), f"{where}.gaussians")
-    variance = np.asarray(found.get("variance_mm2", ()), float)
-    weights = np.asarray(found.get("weights", ()), float)
+    entry = table["gaussians"]
+    if not isinstance(entry, Mapping):
+        raise InputError(f"{where}.gaussians is {entry!r:.60}; expected variance_mm2 and weights")
+    refuse_unknown(entry, ("variance_mm2", "weights"), f"{where}.gaussians")
+    variance = np.asarray(entry.get("variance_mm2", ()), float)
+    weights = np.asarray(entry.get("weights", ()), float)
     good = variance.ndim == 1 and weights.ndim == 2 and len(variance) == len(weights) > 0
     if not good or not (variance > 0).all() or not (weights >= 0).all():
         raise InputError(
@@ -184,10 +184,10 @@ def curve(value: str | Mapping[str, Any], photons: int = PHOTONS, progress: bool
 
 @lru_cache(maxsize=32)
 def _curve(key: str, is_name: bool, photons: int, progress: bool) -> Curve:
-    found = read(key if is_name else json.loads(key))
-    if isinstance(found, GaussianCurve):
-        return found.curve()
-    return simulated(found, photons, progress)
+    medium = read(key if is_name else json.loads(key))
+    if isinstance(medium, GaussianCurve):
+        return medium.curve()
+    return simulated(medium, photons, progress)
 
 
 def simulated(stack: Stack, photons: int = PHOTONS, progress: bool = False) -> Curve:
@@ -284,11 +284,11 @@ def invert(target: Curve, photons: int = 100_000) -> Inversion:
             return float(np.sqrt(np.trapezoid(gap**2, x) / (x[-1] - x[0])))
 
         middle = np.log(target.mean_radius()[c] / unit.mean_radius()[0])
-        found = minimize_scalar(miss, bounds=(middle - 2, middle + 2), method="bounded")
-        mfp = float(np.exp(found.x))
+        minimum = minimize_scalar(miss, bounds=(middle - 2, middle + 2), method="bounded")
+        mfp = float(np.exp(minimum.x))
         sigma_a.append((1 - alpha) / mfp)
         sigma_s.append(alpha / mfp)
-        residual.append(found.fun)
+        residual.append(minimum.fun)
     medium = Medium(
         tuple(sigma_a), tuple(sigma_s), eta=1.0, name=f"{target.name}_inverted", source="inversion"
     )

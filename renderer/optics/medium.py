@@ -18,15 +18,15 @@ from renderer.errors import InputError
 
 def _numbers(name: str, values) -> tuple[float, ...]:
     try:
-        found = tuple(float(v) for v in np.atleast_1d(np.asarray(values, dtype=float)))
+        numbers = tuple(float(v) for v in np.atleast_1d(np.asarray(values, dtype=float)))
     except (TypeError, ValueError):
         raise InputError(f"{name} is {values!r}; expected numbers in 1/mm") from None
-    if not found or not all(math.isfinite(v) and v >= 0 for v in found):
+    if not numbers or not all(math.isfinite(v) and v >= 0 for v in numbers):
         raise InputError(
-            f"{name} is {', '.join(f'{v:g}' for v in found) or 'empty'}; expected finite "
+            f"{name} is {', '.join(f'{v:g}' for v in numbers) or 'empty'}; expected finite "
             "numbers of 0 or more, in 1/mm"
         )
-    return found
+    return numbers
 
 
 def _index(name: str, value) -> float:
@@ -306,7 +306,7 @@ STACKS: dict[str, Stack] = {
 
 def preset(name: str) -> Stack:
     """A preset by its name; letter case and hyphens do not matter."""
-    found = STACKS.get(name.lower().replace("-", "_").replace(" ", "_"))
-    if found is None:
+    stack = STACKS.get(name.lower().replace("-", "_").replace(" ", "_"))
+    if stack is None:
         raise InputError(f"no medium {name!r}; expected one of {', '.join(STACKS)}")
-    return found
+    return stack

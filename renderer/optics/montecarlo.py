@@ -78,23 +78,23 @@ class Layer:
         """A layer from "n=1.4 mu_a=1 mu_s=10 g=0.9 d=1"; n is 1, g is 0 and d infinite where they
         are left out.
         """
-        found = {}
+        values = {}
         for word in text.replace(",", " ").split():
             name, _, value = word.partition("=")
-            if name not in cls.__dataclass_fields__ or name in found:
+            if name not in cls.__dataclass_fields__ or name in values:
                 raise InputError(
                     f"layer {text!r}: {word!r}; expected each of n, mu_a, mu_s, g and d at "
                     "most once, as in mu_a=0.1"
                 )
             try:
-                found[name] = float(value)
+                values[name] = float(value)
             except ValueError:
                 raise InputError(
                     f"layer {text!r}: {name} is {value!r}; expected a number"
                 ) from None
-        if not {"mu_a", "mu_s"} <= set(found):
+        if not {"mu_a", "mu_s"} <= set(values):
             raise InputError(f"layer {text!r} lacks mu_a or mu_s; expected both, in 1/mm")
-        return cls(**found)
+        return cls(**values)
 
 
 @dataclass(frozen=True)
@@ -347,17 +347,17 @@ class Result:
             {name: value for name, value in layer.items() if value != math.inf}
             for layer in setting["layers"]
         ]
-        found = {
+        record = {
             "photons": self.photons,
             **setting,
             "r_mm": plain(self.r_mm),
             "angle_edges": plain(self.angle_edges),
         }
-        del found["angles"]
+        del record["angles"]
         for name in ESTIMATES:
             for key in (name, f"{name}_error"):
-                found[key] = plain(getattr(self, key))
-        return found
+                record[key] = plain(getattr(self, key))
+        return record
 
 
 def batch_sizes(photons: int) -> np.ndarray:

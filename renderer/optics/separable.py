@@ -211,7 +211,7 @@ def guided(
         return float((weight * miss**2).sum()), grad
 
     start = np.sqrt(np.maximum(np.diag(R), 0))
-    found = minimize(
+    solution = minimize(
         cost,
         start / ((count * start).sum() * delta),
         jac=True,
@@ -219,9 +219,9 @@ def guided(
         bounds=[(1e-12, None)] * len(x),
         options={"maxiter": 5000, "maxfun": 20000, "ftol": 1e-13, "gtol": 1e-9},
     )
-    if not found.success:
-        raise ArithmeticError(f"guided optimisation did not converge: {found.message}")
-    return _kernel(f"guided k={k:g}", x, found.x / ((count * found.x).sum() * delta), R)
+    if not solution.success:
+        raise ArithmeticError(f"guided optimisation did not converge: {solution.message}")
+    return _kernel(f"guided k={k:g}", x, solution.x / ((count * solution.x).sum() * delta), R)
 
 
 def preintegrated(profile: Callable, reach_mm: float, points: int = 200) -> Kernel:
@@ -247,13 +247,13 @@ def artist_fit(
     goal = exact.a[points:]
     spread = np.sqrt((exact.a * exact.x_mm**2).sum() / exact.a.sum())
     model = lambda p: artist(x, np.exp(p[0]), np.exp(p[1]), 1 / (1 + np.exp(-p[2])))[:, 0]
-    found = least_squares(
+    solution = least_squares(
         lambda p: model(p) - goal, [np.log(spread / 3), np.log(spread * 1.3), 0.0]
     )
-    near, far, w = np.exp(found.x[0]), np.exp(found.x[1]), 1 / (1 + np.exp(-found.x[2]))
+    near, far, w = np.exp(solution.x[0]), np.exp(solution.x[1]), 1 / (1 + np.exp(-solution.x[2]))
     if near > far:
         near, far, w = far, near, 1 - w
-    return _kernel("artist", x, model(found.x), quadrant(profile, x)), (
+    return _kernel("artist", x, model(solution.x), quadrant(profile, x)), (
         float(near),
         float(far),
         float(w),

@@ -36,8 +36,8 @@ class Surroundings:
         total = self.value.radiance_of_panels(towards)
         if self._layers:
             k = int(np.clip(round(np.log(max(sharpness, 1)) / np.log(4)), 0, LAYERS - 1))
-            found = lookup(self._layers[k], towards @ turn(self.value).T)
-            total = total + self.value.scale * found
+            radiance = lookup(self._layers[k], towards @ turn(self.value).T)
+            total = total + self.value.scale * radiance
         return total
 
     def mean(self) -> np.ndarray:

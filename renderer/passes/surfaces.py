@@ -49,21 +49,21 @@ class Surfaces:
     """
 
     def __init__(
-        self, found: Contents, lights: Sequence, surroundings: Surroundings, rays: int, seed: int
+        self, contents: Contents, lights: Sequence, surroundings: Surroundings, rays: int, seed: int
     ):
         self.seed = seed
         table = surface.table()
         height, width = table.shape[:2]
         self.face = gl.Texture(width, height, GL.GL_RGBA32F, linear=True, data=table)
-        items = [*found.surfaces, *found.eyes]
+        items = [*contents.surfaces, *contents.eyes]
         bodies = [body(item) for item in items]
         baked = bake(bodies, lights, surroundings.radiance, rays, seed) if bodies else []
         self.media: list[str | dict] = []
         self.surfaces = [
-            self._surface(item, b) for item, b in zip(found.surfaces, baked, strict=False)
+            self._surface(item, b) for item, b in zip(contents.surfaces, baked, strict=False)
         ]
-        eyes = baked[len(found.surfaces) :]
-        self.eyes = [_eye(item, b) for item, b in zip(found.eyes, eyes, strict=True)]
+        eyes = baked[len(contents.surfaces) :]
+        self.eyes = [_eye(item, b) for item, b in zip(contents.eyes, eyes, strict=True)]
 
     def _surface(self, item: Item, baked: Baked) -> Drawn:
         part = item.primitive

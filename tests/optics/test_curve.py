@@ -34,10 +34,10 @@ def test_widths_are_those_that_independent_scripts_measured():
 
 def test_monte_carlo_agrees_with_the_profile_it_was_made_for():
     """Burley's curve as rings: its own line integral comes back."""
-    found = curves.from_cdf("burley", lambda r: cdf(np.asarray(r))[:, None], 60.0, 1e-3)
+    tabulated = curves.from_cdf("burley", lambda r: cdf(np.asarray(r))[:, None], 60.0, 1e-3)
     x = np.linspace(0.05, 8, 40)
     expected = line_integral(x, np.full_like(x, np.inf), 1.0)
-    np.testing.assert_allclose(found.edge(x)[:, 0], expected, atol=3e-4)
+    np.testing.assert_allclose(tabulated.edge(x)[:, 0], expected, atol=3e-4)
 
 
 def test_simulated_marble_has_its_albedo_and_its_noise_is_known():
@@ -64,8 +64,8 @@ def test_fits_find_their_own_family_again():
     own = curves.from_cdf(
         "burley", lambda r: cdf(np.asarray(r), 0.7)[:, None], 40.0, 1e-3, albedo=np.array([0.5])
     )
-    found = fits.burley_distance(own)
-    assert found.distance_mm[0] == pytest.approx(0.7, rel=2e-3) and found.error[0] < 1e-3
+    fit = fits.burley_distance(own)
+    assert fit.distance_mm[0] == pytest.approx(0.7, rel=2e-3) and fit.error[0] < 1e-3
 
 
 def test_more_gaussians_fit_better():

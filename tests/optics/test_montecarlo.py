@@ -38,25 +38,25 @@ def test_van_de_hulst_slab():
 
     2, p. 435, table 35: totals, and radiances of the scattered light.
     """
-    found = simulate(HULST, 2_000_000, seed=1)
-    assert found.diffuse_reflectance_error < 3e-4 and found.transmittance_error < 3e-4
-    within(found.diffuse_reflectance, found.diffuse_reflectance_error, 0.09739)
-    within(found.transmittance, found.transmittance_error, 0.66096)
-    within(found.ballistic, found.ballistic_error, math.exp(-2))
+    result = simulate(HULST, 2_000_000, seed=1)
+    assert result.diffuse_reflectance_error < 3e-4 and result.transmittance_error < 3e-4
+    within(result.diffuse_reflectance, result.diffuse_reflectance_error, 0.09739)
+    within(result.transmittance, result.transmittance_error, 0.66096)
+    within(result.ballistic, result.ballistic_error, math.exp(-2))
     mu = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
-    at = np.searchsorted(found.angle_edges, np.arccos(mu)) - 1
+    at = np.searchsorted(result.angle_edges, np.arccos(mu)) - 1
     middle = np.cos(
-        found.angle_edges[at] / 2 + found.angle_edges[at + 1] / 2
+        result.angle_edges[at] / 2 + result.angle_edges[at + 1] / 2
     )  # the table in between, by a smooth curve through I(mu)
     for curve, error, table in (
         (
-            found.R_angular,
-            found.R_angular_error,
+            result.R_angular,
+            result.R_angular_error,
             [0.10641, 0.13304, 0.13856, 0.11956, 0.09411, 0.07132, 0.06180],
         ),
         (
-            found.T_angular,
-            found.T_angular_error,
+            result.T_angular,
+            result.T_angular_error,
             [0.11811, 0.16486, 0.22473, 0.27785, 0.36889, 0.72155, 2.40270],
         ),
     ):
@@ -69,11 +69,12 @@ def test_giovanelli_half_space():
     """Giovanelli 1955, as in the MCML manual: n 1.5, albedo 0.9, isotropic: 0.2600 with the
     mirrored 0.04.
     """
-    found = simulate([Layer(1.5, 1, 9)], 1_000_000, seed=2)
+    result = simulate([Layer(1.5, 1, 9)], 1_000_000, seed=2)
     assert (
-        found.specular == pytest.approx(0.04, abs=1e-12) and found.diffuse_reflectance_error < 4e-4
+        result.specular == pytest.approx(0.04, abs=1e-12)
+        and result.diffuse_reflectance_error < 4e-4
     )
-    within(found.specular + found.diffuse_reflectance, found.diffuse_reflectance_error, 0.2600)
+    within(result.specular + result.diffuse_reflectance, result.diffuse_reflectance_error, 0.2600)
 
 
 def test_three_layers():
@@ -82,11 +83,11 @@ def test_three_layers():
     its own noise.
     """
     layers = [Layer(1.37, 0.1, 10, 0.9, 1), Layer(1.37, 0.1, 1, 0, 1), Layer(1.37, 0.2, 1, 0.7, 2)]
-    found = simulate(layers, 200_000, seed=3)
-    assert found.specular == pytest.approx(0.02437, abs=1e-5)
-    within(found.diffuse_reflectance, found.diffuse_reflectance_error, 0.2375, slack=0.001)
-    within(found.absorbed, found.absorbed_error, 0.6416, slack=0.0015)
-    within(found.transmittance, found.transmittance_error, 0.0965, slack=0.0005)
+    result = simulate(layers, 200_000, seed=3)
+    assert result.specular == pytest.approx(0.02437, abs=1e-5)
+    within(result.diffuse_reflectance, result.diffuse_reflectance_error, 0.2375, slack=0.001)
+    within(result.absorbed, result.absorbed_error, 0.6416, slack=0.0015)
+    within(result.transmittance, result.transmittance_error, 0.0965, slack=0.0005)
 
 
 @pytest.mark.parametrize(
@@ -113,17 +114,17 @@ def test_totals_of_an_independent_program(eta, alpha, total, multiple):
     """Diffuse reflectance per entered light of isotropic half-spaces, all and multiply scattered,
     from another Monte Carlo program whose noise is up to 0.001.
     """
-    found = simulate([Layer(eta, 1 - alpha, alpha)], 30_000 if alpha == 0.999 else 100_000, seed=4)
-    entered = 1 - found.specular
+    result = simulate([Layer(eta, 1 - alpha, alpha)], 30_000 if alpha == 0.999 else 100_000, seed=4)
+    entered = 1 - result.specular
     within(
-        found.diffuse_reflectance / entered,
-        found.diffuse_reflectance_error / entered,
+        result.diffuse_reflectance / entered,
+        result.diffuse_reflectance_error / entered,
         total,
         slack=0.001,
     )
     within(
-        found.multiple_reflectance / entered,
-        found.multiple_reflectance_error / entered,
+        result.multiple_reflectance / entered,
+        result.multiple_reflectance_error / entered,
         multiple,
         slack=0.001,
     )
@@ -154,7 +155,7 @@ def test_single_scattering_by_radius():
     p, averaged over rings.
     """
     g, edges = 0.4, np.array([0, 0.1, 0.3, 1, 2, 4])
-    found = simulate([Layer(1, 0.3, 0.7, g)], 2_000_000, seed=7, bins=edges)
+    result = simulate([Layer(1, 0.3, 0.7, g)], 2_000_000, seed=7, bins=edges)
 
     def share(z, r):
         d = math.hypot(r, z)
@@ -166,52 +167,52 @@ def test_single_scattering_by_radius():
     exact = [
         integrate.dblquad(share, low, high, 0, np.inf)[0] for low, high in itertools.pairwise(edges)
     ]
-    within(found.R_single * found.area_mm2, found.R_single_error * found.area_mm2, exact)
+    within(result.R_single * result.area_mm2, result.R_single_error * result.area_mm2, exact)
 
 
 def test_clear_slab_mirrors_back_and_forth():
-    found = simulate([Layer(1.5, 0, 0, 0, 2)], 200_000, seed=8)
-    within(found.specular, found.specular_error, 2 * 0.04 / 1.04)
-    assert found.diffuse_reflectance == found.absorbed == 0
-    assert found.transmittance == found.ballistic
+    result = simulate([Layer(1.5, 0, 0, 0, 2)], 200_000, seed=8)
+    within(result.specular, result.specular_error, 2 * 0.04 / 1.04)
+    assert result.diffuse_reflectance == result.absorbed == 0
+    assert result.transmittance == result.ballistic
 
 
 def test_pure_absorber_is_beers():
-    found = simulate([Layer(1, 0.5, 0, 0, 1), Layer(1, 2, 0, 0, 0.25)], 300_000, seed=9)
-    within(found.transmittance, found.transmittance_error, math.exp(-1))
+    result = simulate([Layer(1, 0.5, 0, 0, 1), Layer(1, 2, 0, 0, 0.25)], 300_000, seed=9)
+    within(result.transmittance, result.transmittance_error, math.exp(-1))
     within(
-        found.absorbed_by_layer,
-        found.absorbed_by_layer_error,
+        result.absorbed_by_layer,
+        result.absorbed_by_layer_error,
         [1 - math.exp(-0.5), math.exp(-0.5) - math.exp(-1)],
     )
 
 
 def test_diffuse_light_is_mirrored_by_the_diffuse_fresnel_reflectance():
-    found = simulate([Layer(1.4, 5, 0)], 200_000, seed=10, illumination="diffuse")
+    result = simulate([Layer(1.4, 5, 0)], 200_000, seed=10, illumination="diffuse")
     cosines = np.linspace(0, 1, 20001)[1:]
     external = 2 * integrate.trapezoid(fresnel.reflectance(cosines, 1 / 1.4) * cosines, cosines)
-    within(found.specular, found.specular_error, external, slack=1e-6)
-    assert found.specular_error < 5e-4
+    within(result.specular, result.specular_error, external, slack=1e-6)
+    assert result.specular_error < 5e-4
 
 
 def test_total_reflection_from_a_denser_outside():
     """Diffuse light in glass, n 1.5, on air: all beyond the critical angle is mirrored; reciprocity
     gives 1 - (1 - F_in) / 1.5^2.
     """
-    found = simulate([Layer(1, 1, 0)], 300_000, seed=11, n_above=1.5, illumination="diffuse")
+    result = simulate([Layer(1, 1, 0)], 300_000, seed=11, n_above=1.5, illumination="diffuse")
     cosines = np.linspace(0, 1, 20001)[1:]
     outside = 2 * integrate.trapezoid(fresnel.reflectance(cosines, 1 / 1.5) * cosines, cosines)
-    within(found.specular, found.specular_error, 1 - (1 - outside) / 1.5**2, slack=1e-5)
+    within(result.specular, result.specular_error, 1 - (1 - outside) / 1.5**2, slack=1e-5)
 
 
 def test_roulette_is_fair():
     """Forward scattering alone is Beer's law; nearly all of this light has been through roulette,
     for weights below 1e-4.
     """
-    found = simulate([Layer(1, 10, 90, 0.999999, 1)], 300_000, seed=24)
-    assert found.transmittance_error < 0.006 * found.transmittance
+    result = simulate([Layer(1, 10, 90, 0.999999, 1)], 300_000, seed=24)
+    assert result.transmittance_error < 0.006 * result.transmittance
     within(
-        found.transmittance, found.transmittance_error, math.exp(-10), slack=1e-3 * math.exp(-10)
+        result.transmittance, result.transmittance_error, math.exp(-10), slack=1e-3 * math.exp(-10)
     )
 
 
@@ -222,14 +223,14 @@ def test_light_is_bent_between_layers():
     critical, half = (
         math.tan(math.asin(sine / 1.5)) for sine in (1, math.sqrt(0.75))
     )  # grazing, and theta_1 = 60 degrees
-    found = simulate(
+    result = simulate(
         [Layer(1, 0, 100, 0, 1e-3), Layer(1.5, d=1)],
         400_000,
         seed=25,
         n_below=1.5,
         bins=[0, half, critical * 1.01, 9],
     )
-    inner, outer, beyond = found.T_single * found.area_mm2
+    inner, outer, beyond = result.T_single * result.area_mm2
     assert beyond < 0.005 * inner and outer > 0.1 * inner  # a few run along the sheet first
     # Scattered at depth t of the sheet, tau = 0.1: int e^(-t) / 2 int_(mu) e^(-(tau - t) / mu) (1 -
     # F(mu)) dmu dt over mu > 1/2.
@@ -242,13 +243,13 @@ def test_light_is_bent_between_layers():
         t,
     )
     # Some light that was mirrored at the glass before is scattered once, too: at most 4 % of 5 %.
-    within(inner, found.T_single_error[0] * found.area_mm2[0], exact, slack=0.05 * exact)
+    within(inner, result.T_single_error[0] * result.area_mm2[0], exact, slack=0.05 * exact)
 
 
 def test_conservative_slab_returns_everything():
-    found = simulate([Layer(1.4, 0, 5, 0.8, 2)], 50_000, seed=12, n_below=1.33)
-    assert found.absorbed == pytest.approx(0, abs=5 * found.absorbed_error + 1e-12)
-    assert found.specular + found.diffuse_reflectance + found.transmittance == pytest.approx(
+    result = simulate([Layer(1.4, 0, 5, 0.8, 2)], 50_000, seed=12, n_below=1.33)
+    assert result.absorbed == pytest.approx(0, abs=5 * result.absorbed_error + 1e-12)
+    assert result.specular + result.diffuse_reflectance + result.transmittance == pytest.approx(
         1, abs=1e-11
     )
 
@@ -277,21 +278,21 @@ STACKS = {
 
 @pytest.mark.parametrize("stack", STACKS)
 def test_no_energy_is_lost_and_curves_hold_it_all(stack):
-    found = simulate(**STACKS[stack], photons=40_000, seed=13, r_max_mm=1.5, bins=17)
+    result = simulate(**STACKS[stack], photons=40_000, seed=13, r_max_mm=1.5, bins=17)
     assert (
-        found.specular + found.diffuse_reflectance + found.transmittance + found.absorbed
+        result.specular + result.diffuse_reflectance + result.transmittance + result.absorbed
         == pytest.approx(1, abs=1e-12)
     )
-    assert found.absorbed == pytest.approx(found.absorbed_by_layer.sum(), abs=1e-12)
-    scattered = found.transmittance - found.ballistic
+    assert result.absorbed == pytest.approx(result.absorbed_by_layer.sum(), abs=1e-12)
+    scattered = result.transmittance - result.ballistic
     for total, curve, beyond, angular in (
-        (found.diffuse_reflectance, found.R, found.R_beyond, found.R_angular),
-        (scattered, found.T, found.T_beyond, found.T_angular),
+        (result.diffuse_reflectance, result.R, result.R_beyond, result.R_angular),
+        (scattered, result.T, result.T_beyond, result.T_angular),
     ):
-        assert (curve * found.area_mm2).sum() + beyond == pytest.approx(total, abs=1e-13)
-        assert (angular * found.solid_angle).sum() == pytest.approx(total, abs=1e-13)
-    assert np.allclose(found.R, found.R_single + found.R_multiple, atol=1e-15)
-    assert found.single_transmittance + found.multiple_transmittance == pytest.approx(
+        assert (curve * result.area_mm2).sum() + beyond == pytest.approx(total, abs=1e-13)
+        assert (angular * result.solid_angle).sum() == pytest.approx(total, abs=1e-13)
+    assert np.allclose(result.R, result.R_single + result.R_multiple, atol=1e-15)
+    assert result.single_transmittance + result.multiple_transmittance == pytest.approx(
         scattered, abs=1e-13
     )
 
@@ -328,10 +329,10 @@ def test_standard_errors_are_honest():
 
 
 def test_photons_that_do_not_divide_into_batches():
-    found = simulate([Layer(1, 1, 0)], 100, seed=17)
-    assert found.absorbed == pytest.approx(1, abs=1e-13) and found.absorbed_error == pytest.approx(
-        0, abs=1e-13
-    )
+    result = simulate([Layer(1, 1, 0)], 100, seed=17)
+    assert result.absorbed == pytest.approx(
+        1, abs=1e-13
+    ) and result.absorbed_error == pytest.approx(0, abs=1e-13)
 
 
 # Sampling.
@@ -379,11 +380,11 @@ def splitmix(state):
 
 def test_splitmix_is_steeles():
     """The generator's published first outputs for the seed 1234567."""
-    state, found = np.uint64(1234567), []
+    state, draws = np.uint64(1234567), []
     for _ in range(3):
         state, bits = splitmix(np.uint64(state))
-        found.append(int(bits))
-    assert found == [6457827717110365317, 3203168211198807973, 9817491932198370423]
+        draws.append(int(bits))
+    assert draws == [6457827717110365317, 3203168211198807973, 9817491932198370423]
 
 
 # Runs: threads, the cache, interruption.

@@ -56,26 +56,26 @@ def test_json(run, tmp_path):
         "--json",
         "--no-cache",
     )
-    found = json.loads(out)
+    record = json.loads(out)
     assert code == 0 and not err and list(tmp_path.iterdir()) == []
     assert (
-        found["photons"] == 6400
-        and found["seed"] == 3
-        and found["illumination"] == "diffuse"
-        and found["n_above"] == 1.1
+        record["photons"] == 6400
+        and record["seed"] == 3
+        and record["illumination"] == "diffuse"
+        and record["n_above"] == 1.1
     )
-    assert found["layers"] == [
+    assert record["layers"] == [
         {"n": 1, "mu_a": 1, "mu_s": 9, "g": 0.75, "d": 0.2},
         {"n": 1.4, "mu_a": 1, "mu_s": 2, "g": 0},
     ]  # infinite: no d
     assert (
-        found["edges_mm"][-1] == 2
-        and len(found["R"]) == len(found["R_error"]) == len(found["r_mm"]) == 120
+        record["edges_mm"][-1] == 2
+        and len(record["R"]) == len(record["R_error"]) == len(record["r_mm"]) == 120
     )
-    assert found["specular"] + found["diffuse_reflectance"] + found["transmittance"] + found[
+    assert record["specular"] + record["diffuse_reflectance"] + record["transmittance"] + record[
         "absorbed"
     ] == pytest.approx(1, abs=1e-12)
-    assert found["transmittance"] == 0
+    assert record["transmittance"] == 0
 
 
 @pytest.mark.parametrize(

@@ -311,18 +311,18 @@ def test_judge_command_for_a_slab(run, tmp_path):
         "judge", "--medium", "marble", "--thickness", 2, "--photons", 60000, "--out", "s.csv"
     )
     assert code == 0 and out.startswith("s.csv: ")
-    found = {
+    by_name = {
         (row["model"], row["face"], row["channel"]): row
         for row in rows((tmp_path / "s.csv").read_text())
     }
     for face in "RT":
-        assert abs(float(found["multipole", face, "R"]["total_error"])) < 6
-        assert abs(float(found["quantized_diffusion", face, "R"]["total_error"])) < 6
+        assert abs(float(by_name["multipole", face, "R"]["total_error"])) < 6
+        assert abs(float(by_name["quantized_diffusion", face, "R"]["total_error"])) < 6
         assert (
-            found["multipole", face, "G"]["model_total"]
-            == found["layered", face, "G"]["model_total"]
+            by_name["multipole", face, "G"]["model_total"]
+            == by_name["layered", face, "G"]["model_total"]
         )
-    assert ("dipole", "T", "R") not in found and found["multipole", "R", "R"][
+    assert ("dipole", "T", "R") not in by_name and by_name["multipole", "R", "R"][
         "material"
     ] == "marble 2 mm"
 

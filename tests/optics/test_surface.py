@@ -14,14 +14,14 @@ COSINES = np.array([1.0, 0.7, 0.4, 0.1])
 )
 def test_a_white_face_sends_back_what_independent_integrals_give(roughness, white):
     """F = 1: the two parts together; never more than all."""
-    found = surface.specular_albedo(COSINES, [roughness]).sum(axis=2)[:, 0]
-    np.testing.assert_allclose(found, white, atol=2e-3)
-    assert found.max() <= 1
+    reflected = surface.specular_albedo(COSINES, [roughness]).sum(axis=2)[:, 0]
+    np.testing.assert_allclose(reflected, white, atol=2e-3)
+    assert reflected.max() <= 1
 
 
 def test_skin_sends_back_little_until_it_is_grazed():
-    found = surface.specular_albedo(COSINES, [0.3])[:, 0] @ [0.028, 1.0]
-    np.testing.assert_allclose(found, [0.0255, 0.0289, 0.0672, 0.2428], atol=2e-4)
+    reflected = surface.specular_albedo(COSINES, [0.3])[:, 0] @ [0.028, 1.0]
+    np.testing.assert_allclose(reflected, [0.0255, 0.0289, 0.0672, 0.2428], atol=2e-4)
 
 
 def test_the_table_agrees_with_a_quadrature_of_the_shader_s_own_formula():

@@ -60,12 +60,12 @@ def edge_response(drawing, technique, curve, pixels_per_mm, depth_mm, tilt_deg=0
 
 def width_mm(u, response, low=0.1, high=0.9):
     """Width of an edge between two shares of its height, mm: (3,)."""
-    found = []
+    widths = []
     for c in range(response.shape[1]):
         falling = np.minimum.accumulate(response[:, c])
         places = [np.interp(-share, -falling, u) for share in (high, low)]
-        found.append(places[1] - places[0])
-    return np.array(found)
+        widths.append(places[1] - places[0])
+    return np.array(widths)
 
 
 def rms(u, response, curve, reach_mm):

@@ -41,8 +41,8 @@ def test_a_conserving_face_holds_back_what_it_reflects(name):
     """A lamp at 45 degrees: E (1 - rho), on the screen, over the atlas and at points."""
     parameters = {**small(name).plain(), "texturing": 0.0, "diffuse": "conserving"}
     back = surface.specular_albedo([np.sqrt(0.5)], [0.4])[0, 0] @ [0.05, 1.0]
-    found = irradiance(renderer.make(name, parameters))
-    np.testing.assert_allclose(found, 2 * np.sqrt(0.5) * (1 - back), rtol=5e-3)
+    measured = irradiance(renderer.make(name, parameters))
+    np.testing.assert_allclose(measured, 2 * np.sqrt(0.5) * (1 - back), rtol=5e-3)
 
 
 def test_disney_follows_the_lamp_and_the_eye():

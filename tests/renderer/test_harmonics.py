@@ -55,7 +55,7 @@ def test_coefficients_match_an_adaptive_quadrature():
     def radiance(d):
         return 0.3 + 0.2 * d[..., 1] + 2.0 * np.exp(12 * (d @ sun - 1))
 
-    found = harmonics.project(radiance(directions(256))[..., None])[:, 0]
+    coefficients = harmonics.project(radiance(directions(256))[..., None])[:, 0]
     for k in range(9):
 
         def inner(phi, theta, k=k):
@@ -64,17 +64,17 @@ def test_coefficients_match_an_adaptive_quadrature():
             return radiance(d) * harmonics.basis(d)[k] * s
 
         wanted, _ = integrate.dblquad(inner, 0, np.pi, -np.pi, np.pi, epsabs=1e-5, epsrel=1e-5)
-        assert found[k] == pytest.approx(wanted, abs=1e-4)
+        assert coefficients[k] == pytest.approx(wanted, abs=1e-4)
 
 
 def test_irradiance_is_that_of_the_whole_map_within_three_percent():
     """Of a broad sky; the cosine's degrees above 2 are what is missing (Ramamoorthi 2001)."""
     d = directions(64)
     sky = (1.0 + 0.8 * d[..., 1] + np.exp(3 * (d[..., 0] - 1)))[..., None]
-    found = harmonics.project(sky)
+    coefficients = harmonics.project(sky)
     for normal in np.eye(3):
         exact = (sky[..., 0] * np.maximum(d @ normal, 0) * solid_angles(64)).sum()
-        assert harmonics.irradiance(found, normal)[0] == pytest.approx(exact, rel=0.03)
+        assert harmonics.irradiance(coefficients, normal)[0] == pytest.approx(exact, rel=0.03)
     even = harmonics.irradiance(harmonics.project(np.ones((32, 64, 1))), [0, 0, 1])
     assert even[0] == pytest.approx(np.pi, rel=1e-3)
 
@@ -93,8 +93,10 @@ def test_the_command_prints_them(tmp_path, capsys):
     oiio.ImageBufAlgo.fill(image, (1.0, 0.5, 0.25))
     assert image.write(str(file))
     assert main(["harmonics", str(file), "--json"]) in (0, None)
-    found = json.loads(capsys.readouterr().out)["coefficients"]
-    np.testing.assert_allclose(found["L00"], np.sqrt(4 * np.pi) * np.array([1, 0.5, 0.25]), 5e-3)
-    assert np.abs(found["L20"]).max() < 5e-3
+    coefficients = json.loads(capsys.readouterr().out)["coefficients"]
+    np.testing.assert_allclose(
+        coefficients["L00"], np.sqrt(4 * np.pi) * np.array([1, 0.5, 0.25]), 5e-3
+    )
+    assert np.abs(coefficients["L20"]).max() < 5e-3
     assert main(["harmonics", str(tmp_path / "none.hdr")]) == 2
     assert "no such file" in capsys.readouterr().err

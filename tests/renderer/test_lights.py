@@ -57,11 +57,11 @@ def drawn(scene_table, techniques, size=(128, 96)):
     staged = scenes.stage(scenes.read_scene(scene_table))
     options = {"size": size, "supersample": 1, "rays": 16, "shadow_map": 1024}
     with renderer.Renderer(staged.graph, **options) as drawing, drawing.frame(CAMERA) as frame:
-        found = {"irradiance": frame.surface.textures[0].read().copy()}
+        buffers = {"irradiance": frame.surface.textures[0].read().copy()}
         for name in techniques:
             with frame.scatter(small(name)) as target:
-                found[name] = target.textures[0].read()[..., :3].copy()
-        return found
+                buffers[name] = target.textures[0].read()[..., :3].copy()
+        return buffers
 
 
 def test_light_adds_in_irradiance_and_through_every_linear_technique():
@@ -79,8 +79,8 @@ def test_light_adds_in_irradiance_and_through_every_linear_technique():
 
 
 def test_two_media_in_one_picture_have_ids_of_their_own():
-    found = drawn(table(FIVE), ["golubev"])
-    assert set(np.unique(found["irradiance"][..., 3])) == {0.0, 1.0, 2.0}
+    buffers = drawn(table(FIVE), ["golubev"])
+    assert set(np.unique(buffers["irradiance"][..., 3])) == {0.0, 1.0, 2.0}
 
 
 def irradiance_on_a_sheet(light, **scene):
@@ -191,8 +191,8 @@ def test_a_map_is_turned_towards_the_persons_left(tmp_path):
     for turn, axis in ((0.0, [0, 0, 1]), (90.0, [1, 0, 0]), (-90.0, [-1, 0, 0])):
         around = Surroundings(Environment(map=str(file), turn_deg=turn))
         directions = np.array([[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 0, -1]], float)
-        found = around.radiance(directions, 64.0)[:, 0]
-        np.testing.assert_array_equal(directions[found.argmax()], axis)
+        radiance = around.radiance(directions, 64.0)[:, 0]
+        np.testing.assert_array_equal(directions[radiance.argmax()], axis)
 
 
 def test_convolved_maps_keep_their_light():
@@ -301,14 +301,14 @@ def bytes_of(tmp_path_factory):
 
     def run(platform, threads):
         variables = {"PYOPENGL_PLATFORM": platform, "LP_NUM_THREADS": str(threads)}
-        found = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", PROGRAM, scene],
             env={**os.environ, **variables},
             capture_output=True,
             text=True,
         )
-        assert found.returncode == 0, found.stderr
-        return found.stdout
+        assert process.returncode == 0, process.stderr
+        return process.stdout
 
     return run
 

@@ -48,9 +48,9 @@ def shaded(**material):
 
 
 def test_an_albedo_map_is_shown_and_skin_lies_over_it_as_far_as_it_says(maps):
-    alone = shaded(albedo_map=maps["albedo"], map_layers=[])
-    np.testing.assert_allclose(alone[2], GREY, rtol=2e-3)
-    np.testing.assert_allclose(alone[0], 2.0, rtol=1e-3)  # flat: no relief
+    mapped = shaded(albedo_map=maps["albedo"], map_layers=[])
+    np.testing.assert_allclose(mapped[2], GREY, rtol=2e-3)
+    np.testing.assert_allclose(mapped[0], 2.0, rtol=1e-3)  # flat: no relief
     masks = {"pores": 1.0}
     freckled = shaded(
         albedo_map=maps["albedo"],

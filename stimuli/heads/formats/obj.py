@@ -136,8 +136,8 @@ class _Lines:
             pass
         usual = len(self.rest(lines[0], word).split())  # now that something is wrong, find where
         for line in lines:
-            found = self.rest(line, word)
-            values = re.split(" +", found)
+            text = self.rest(line, word)
+            values = re.split(" +", text)
             if (
                 len(values) != usual
                 or usual not in WIDTHS[word]
@@ -146,7 +146,7 @@ class _Lines:
                 break
         wanted = " or ".join(map(str, WIDTHS[word]))
         raise self.source.error(
-            f"line {line + 1}: found {f'{word.decode()} {found}'[:60]!r}, expected {wanted} "
+            f"line {line + 1}: found {f'{word.decode()} {text}'[:60]!r}, expected {wanted} "
             "numbers, the same count on every such line"
         )
 
