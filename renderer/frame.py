@@ -13,7 +13,7 @@ import pyrender
 from renderer import VERSION, gl
 from renderer.errors import InputError
 from renderer.gl import GL
-from renderer.memory import give_back
+from renderer.memory import give_back, give_back_large
 from renderer.passes.composite import composite
 from renderer.passes.environment import Surroundings
 from renderer.passes.given import draw_given
@@ -85,6 +85,7 @@ class Renderer:
         if not contents.surfaces:
             raise InputError("the scene has no surface; expected at least one mesh")
         self.scene, self.size, self.supersample, self.seed = scene, size, supersample, seed
+        give_back_large()
         give_back()  # what the making of the scene has freed
         self.context = gl.Context()
         try:
@@ -237,6 +238,7 @@ class Frame:
         GL.glColorMask(False, False, False, False)
         depth = r.program("passes/depth.frag", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert")
         r.surfaces.draw_depth(depth, self._shared)
+        gl.finish()
         GL.glColorMask(True, True, True, True)
         GL.glColorMaski(1, True, True, True, False)  # the alpha of specular light is hair's
         r.surfaces.draw(r.program, r.lamps, r.surroundings, self._shared)

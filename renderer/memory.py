@@ -2,13 +2,23 @@
 
 import ctypes
 
+M_MMAP_THRESHOLD = -3  # of glibc's malloc.h
+LARGE = 1 << 20
+
+
+def give_back_large() -> None:
+    """From now on, blocks above 1 MB go back to the system as soon as they are freed.
+
+    glibc keeps those below 32 MB for later once it has met one; between frames that is 200 MB of
+    buffers. Other C libraries have no such call and are left alone.
+    """
+    choose = getattr(ctypes.CDLL(None), "mallopt", None)
+    if choose is not None:
+        choose(M_MMAP_THRESHOLD, LARGE)
+
 
 def give_back() -> None:
-    """Give what was freed back to the system.
-
-    glibc keeps freed blocks below 32 MB for later; the making of a head leaves 100 MB of them.
-    Other C libraries have no such call and are left alone.
-    """
+    """Give what was freed so far back to the system: the making of a head leaves 100 MB of it."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)

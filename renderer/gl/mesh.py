@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 
 from renderer.gl.context import GL, Context, free, owned
@@ -13,6 +15,11 @@ def _delete_vertex_array(name: int) -> None:
 
 def _delete_buffer(name: int) -> None:
     GL.glDeleteBuffers(1, [name])
+
+
+#: Indices of triangles that are drawn before the driver is waited for: a software driver keeps
+#: half a kilobyte of each until it is done.
+AT_ONCE = 3 * 32768
 
 
 class Mesh:
@@ -43,9 +50,12 @@ class Mesh:
 
     def draw(self) -> None:
         GL.glBindVertexArray(self.vertex_array)
-        if self.indices:
-            GL.glDrawElements(GL.GL_TRIANGLES, self.indices, GL.GL_UNSIGNED_INT, None)
-        else:
+        for start in range(0, self.indices, AT_ONCE):
+            if start:
+                finish()
+            count, offset = min(AT_ONCE, self.indices - start), ctypes.c_void_p(4 * start)
+            GL.glDrawElements(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, offset)
+        if not self.indices:
             GL.glDrawArrays(GL.GL_POINTS, 0, self.vertices)
         GL.glBindVertexArray(0)
 
