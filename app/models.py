@@ -109,6 +109,8 @@ class Participant(Base):
     completion_code: Mapped[str | None] = mapped_column(String(16), unique=True)  # to be shown
     # to be kept; None: completed before there was one, when the code did both
     withdrawal_key: Mapped[str | None] = mapped_column(String(16), index=True, unique=True)
+    # to go on elsewhere; None: began before there was one
+    resume_code: Mapped[str | None] = mapped_column(String(16), index=True, unique=True)
     completed_at: Mapped[datetime | None]
     withdrawn_at: Mapped[datetime | None]
     pilot: Mapped[bool] = mapped_column(default=False)  # tried the study out: does not count

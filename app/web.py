@@ -143,7 +143,7 @@ def _error_page(error: HTTPException):
             "this site, reload and try again."
         )
     if wants_json():
-        return jsonify(error=message), error.code
+        return jsonify(error=message, lost=isinstance(error, CSRFError)), error.code
     response = error.get_response()
     response.data = render_template("error.html", code=error.code, name=error.name, message=message)
     response.content_type = "text/html; charset=utf-8"

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from analysis.declared import options
 from analysis.manifest import WHOLE, read_region, read_self_rating
+from stimuli.asking import Participants, read_participants
 from stimuli.errors import InputError
 from stimuli.parts import read_toml
 from stimuli.scenes import load_table, merge
@@ -189,6 +190,7 @@ class Study:
     scene: dict | None = None
     analysis: dict = field(default_factory=dict)
     viewer: Viewer = Viewer()
+    participants: Participants = Participants()
 
     @property
     def framings(self) -> tuple[Level, ...]:
@@ -255,6 +257,7 @@ class Study:
             },
             "consent": self.consent,
             "viewer": self.viewer.record(),
+            "participants": vars(self.participants),
             **({"analysis": self.analysis} if self.analysis else {}),
         }
 
@@ -328,6 +331,7 @@ def read_study(
         scene=scene,
         analysis=_analysis(table),
         viewer=read_viewer(table.table("viewer", default={}), display),
+        participants=read_participants(table.table("participants", default={})),
     )
     refuse_doubles(techniques, "name")
     refuse_doubles(techniques, "label")

@@ -99,7 +99,7 @@ def enrol(
     if (door := recruiting.door(session, record, insider=insider)) is not Door.OPEN:
         return door
     pilot = record.state in ("draft", "pilot")
-    participant = Participant(visit=visit, pilot=pilot, recruit=recruit)
+    participant = Participant(visit=visit, resume_code=_secret(), pilot=pilot, recruit=recruit)
     session.add(participant)
     session.flush()  # gives the number
     session.add_all(assign(study, participant))
@@ -331,6 +331,12 @@ def find_by_key(session: Session, key: str) -> Participant | None:
     old = Participant.withdrawal_key.is_(None) & (Participant.completion_code == plain)
     asked = select(Participant).where((Participant.withdrawal_key == plain) | old)
     return session.scalar(asked) if plain else None
+
+
+def find_by_resume_code(session: Session, code: str) -> Participant | None:
+    """The participant who was given a code to go on elsewhere, however it was typed."""
+    plain = plain_code(code)
+    return session.scalar(select(Participant).filter_by(resume_code=plain)) if plain else None
 
 
 def _note(session: Session, participant: Participant, kind: str) -> None:

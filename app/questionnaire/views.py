@@ -198,7 +198,10 @@ def answer():
     visit, bound = session.get("visit", ""), not simulated()
     said = flow.answer(database(), study(), visit, trial, given, shown, bound=bound)
     if said is None:
-        abort(400, "This browser has not begun the questionnaire.")
+        message = "This browser has not begun the questionnaire, or lost its cookies."
+        if wants_json():
+            return jsonify(error=message, lost=True), 400
+        abort(400, message)
     outcome, here = said
     if here.answered == here.questions:
         # the answers are on the disk: now the committed ones can be counted
@@ -238,6 +241,9 @@ def withdraw():
 @blueprint.post("/withdraw")
 def withdraw_now():
     """Withdraw this browser's participant, or the one who was given a withdrawal key."""
+    if request.form.get("confirm") != "yes":
+        flash("Nothing was withdrawn. Please tick the box if you want to withdraw.")
+        return redirect(url_for(".withdraw"), 303)
     with database().write() as db:
         if "code" in request.form:
             if not _code_attempts.allow(request.remote_addr):
@@ -264,11 +270,44 @@ def withdrawn():
         return _redirect_to_due(_participant(db)) or render_template("questionnaire/withdrawn.html")
 
 
+@blueprint.get("/resume/")
+@blueprint.get("/resume/<code>")
+def resume(code: str = ""):
+    """Where somebody goes on who began in another browser, or whose cookies were cleared."""
+    return render_template("questionnaire/resume.html", code=code)
+
+
+@blueprint.post("/resume/")
+def resume_now():
+    if not _code_attempts.allow(request.remote_addr):
+        abort(429, "Too many codes were tried. Wait five minutes and try again.")
+    with database().read() as db:
+        participant = flow.find_by_resume_code(db, request.form.get("resume", ""))
+        own = _participant(db)
+        if participant is None:
+            flash("Nobody was given this code. Please check it.")
+            return redirect(url_for(".resume"), 303)
+        if own is not None and own.id != participant.id and _place(own) in _UNFINISHED:
+            flash("This browser is in the middle of another person's questions; they go on here.")
+            return redirect(url_for(_place(own)), 303)
+        session["visit"] = participant.visit
+        session.permanent = True
+        participant = _participant(db)
+    _code_attempts.forget(request.remote_addr)
+    return redirect(url_for(_place(participant)), 303)
+
+
 @blueprint.post("/another")
 def another():
-    """Let another person begin in this browser."""
+    """Let another person begin in this browser, where the study's people share one."""
+    if not study().definition.participants.shared_device:
+        abort(403, "In this study one browser is for one person.")
     session.pop("visit", None)
     return redirect(url_for(".welcome"), 303)
+
+
+#: Pages of somebody who has begun and has not finished.
+_UNFINISHED = ("questionnaire.familiarity", "questionnaire.question")
 
 
 def _participant(db: Session, *, lock: bool = False) -> Participant | None:

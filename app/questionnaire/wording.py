@@ -7,7 +7,10 @@ QUESTION = {
     "sending": "Saving the answer that was not sent yet …",
     "unsaved": "Not saved yet, trying again …",
     "waiting": "Saved. Waiting for the next question …",
-    "refused": "The answer was not accepted. Please reload the page and answer again.",
+    "rejected": "The answer was not accepted. Please reload the page and answer again.",
+    "stale": "That was not the current question; nothing was changed. Please go on here.",
+    "refused": "That question was answered already, perhaps in another tab; the first answer was "
+    "kept.",
     "resampled": "resampled, {percent} %",
     "image": "Image",
 }

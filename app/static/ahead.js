@@ -9,6 +9,15 @@ const ahead = document.getElementById("ahead"), viewer = JSON.parse(ahead.datase
 const loaded = new Promise((done) => (document.readyState === "complete" ? done() : addEventListener("load", done)));
 loaded.then(() => pictures.ahead(JSON.parse(ahead.dataset.upcoming), viewer, viewer.display === FIT ? roomOfQuestion() : null));
 
+// Somebody who was in the middle and whose cookies were cleared finds the way back.
+const back = document.getElementById("back"), code = back && stored(`subdermal:resume:${location.pathname}`);
+if (code) {
+  back.querySelector("a").href = code;
+  back.hidden = false;
+}
+
+function stored(name) { try { return localStorage.getItem(name); } catch { return null; } }
+
 // Lay out an empty question in the place of this page, measure it, and take it away before anything is painted.
 function roomOfQuestion() {
   const others = [...document.body.children].filter((one) => one.matches("main") && !one.hidden), { className } = document.body;

@@ -5,8 +5,9 @@ import { Viewer, roomOf } from "./pair.js";
 import { pictures, rest } from "./pictures.js";
 
 const UNSENT = `subdermal:unsent:${location.pathname}`, KEYS_OFF = "subdermal:keys-off";
+const RESUME = `subdermal:resume:${location.pathname.replace(/question$/, "")}`;
 const FIRST_PAUSE_MS = 500, LONGEST_PAUSE_MS = 8000, PATIENCE_MS = 15000;
-let viewer = null, words = {};
+let viewer = null, words = {}, notice = null;
 
 document.documentElement.classList.add("ready");
 document.addEventListener("keydown", onKey);
@@ -19,6 +20,9 @@ async function begin() {
   words = JSON.parse(page.dataset.words);
   scale.disabled = true;
   viewer = null;
+  tell(page, notice);
+  notice = null;
+  if (page.dataset.resume) store(RESUME, page.dataset.resume);
 
   const unsent = recall();
   if (unsent && unsent.participant === page.dataset.participant) {
@@ -53,16 +57,34 @@ async function begin() {
 }
 
 // Send until the server has acknowledged; the address of what comes next, or null where only a reload helps.
-async function deliver(page, form, fields) {
+// A browser whose cookies were cleared meanwhile is let in again by the participant's code, once.
+async function deliver(page, form, fields, again = true) {
   const body = new URLSearchParams({ ...fields, csrf_token: form.elements.csrf_token.value });
   const response = await insist(page, words.unsaved, form.action, {
     method: "POST", body, headers: { Accept: "application/json" },
   });
-  forget();
-  if (response.ok || response.status === 409) return (await response.json()).next;
   const told = await response.json().catch(() => ({}));
-  say(page, told.error || words.refused);
+  if (response.ok || response.status === 409) {
+    forget();
+    notice = words[told.outcome] ?? null; // of an answer that was not taken
+    return told.next;
+  }
+  if (told.lost && again && (await letIn(page, form))) return deliver(page, form, fields, false);
+  if (!told.lost) forget();
+  say(page, told.error || words.rejected);
   return null;
+}
+
+// Whether this browser has its participant again, by the code that the page holds.
+async function letIn(page, form) {
+  if (!page.dataset.resume) return false;
+  const read = async (response) => new DOMParser().parseFromString(await response.text(), "text/html");
+  const door = (await read(await insist(page, words.unsaved, page.dataset.resume, { headers: { Accept: "text/html" } }))).querySelector("form[data-resume]");
+  const body = new URLSearchParams(new FormData(door));
+  const response = await insist(page, words.unsaved, door.getAttribute("action"), { method: "POST", body, headers: { Accept: "text/html" } });
+  const token = (await read(response)).querySelector("[name=csrf_token]");
+  if (response.ok && token) form.elements.csrf_token.value = token.value;
+  return Boolean(response.ok && token);
 }
 
 // Show the next question in place, so that a connection lost in between leaves a page that goes on trying.
@@ -71,7 +93,10 @@ async function advance(page, next) {
   const response = await insist(page, words.waiting, next, { headers: { Accept: "text/html" } });
   const arrived = new DOMParser().parseFromString(await response.text(), "text/html");
   const main = arrived.querySelector("main[data-trial]");
-  if (!response.ok || !main) return location.replace(response.url);
+  if (!response.ok || !main) {
+    store(RESUME, null);
+    return location.replace(response.url);
+  }
   document.title = arrived.title;
   page.replaceWith(document.adoptNode(main));
   window.scrollTo(0, 0);
@@ -123,6 +148,12 @@ function offerKeys(page) {
   if (!box) return;
   box.checked = !stored(KEYS_OFF);
   box.addEventListener("change", () => store(KEYS_OFF, box.checked ? null : "1"));
+}
+
+function tell(page, message) {
+  const place = page.querySelector(".notice");
+  place.textContent = message ?? "";
+  place.hidden = !message;
 }
 
 function say(page, message) {

@@ -21,7 +21,7 @@ def table(response):
 def withdraw(somebody):
     somebody.get("/withdraw")
     form = somebody.form("csrf_token")
-    somebody.http.post("/withdraw", data={"csrf_token": form["csrf_token"]})
+    somebody.http.post("/withdraw", data=form | {"confirm": "yes"})
 
 
 def test_the_export_has_one_row_for_each_answer(person, experimenter, app):

@@ -316,6 +316,8 @@ def test_withdrawn_answers_stay_in_the_database_and_end_the_questions(person):
         data={"csrf_token": somebody.form("csrf_token")["csrf_token"]},
         follow_redirects=True,
     )
+    assert somebody.path == "/withdraw" and "Nothing was withdrawn" in somebody.page.text
+    somebody.send("confirm", confirm="yes")
     assert somebody.path == "/withdrawn"
     somebody.get("/question")
     assert somebody.path == "/withdrawn"
@@ -335,9 +337,9 @@ def test_withdrawing_by_code_from_another_device(app, person):
     elsewhere = person()
     elsewhere.get("/withdraw")
     for wrong in ("WRONGCODE2", paid):  # whoever pays sees the code, and cannot withdraw by it
-        elsewhere.send("code", code=wrong)
+        elsewhere.send("code", code=wrong, confirm="yes")
         assert "No participant was given this key" in elsewhere.page.text
-    elsewhere.send("code", code=f" {code[:5].lower()}-{code[5:]} ")
+    elsewhere.send("code", code=f" {code[:5].lower()}-{code[5:]} ", confirm="yes")
     assert elsewhere.path == "/withdrawn"
     somebody.get("/thanks")
     assert somebody.path == "/withdrawn"
@@ -350,7 +352,7 @@ def test_withdrawing_anothers_code_leaves_the_own_questions_where_they_were(pers
     somebody.get("/withdraw")
     somebody.page = somebody.http.post(
         "/withdraw",
-        data={"csrf_token": somebody.form("csrf_token")["csrf_token"], "code": code},
+        data=somebody.form("confirm") | {"code": code, "confirm": "yes"},
         follow_redirects=True,
     )
     assert somebody.path == "/question" and "Yours go on" in somebody.page.text
@@ -368,19 +370,39 @@ def test_who_completed_before_there_were_keys_withdraws_by_the_code(app, person)
     assert 'id="withdrawal-key"' not in somebody.page.text
     elsewhere = person()
     elsewhere.get("/withdraw")
-    elsewhere.send("code", code=code)
+    elsewhere.send("code", code=code, confirm="yes")
     assert elsewhere.path == "/withdrawn"
 
 
-def test_another_person_on_the_same_device(person):
-    somebody = person().begin().answer(*[0] * 30)
-    somebody.page = somebody.http.post(
-        "/another",
-        data={"csrf_token": somebody.form("csrf_token")["csrf_token"]},
-        follow_redirects=True,
-    )
+def test_another_person_on_a_shared_device(tmp_path, write_study, person):
+    shared = write_study(tmp_path / "laboratory", participants={"shared_device": True})
+    somebody = Person(create_app(shared)).begin().answer(*[0] * 30)
+    somebody.send("csrf_token")
     assert somebody.path == "/" and "consent" in somebody.form("consent")
     assert somebody.begin().answers == []
+    alone = person().begin().answer(*[0] * 30)
+    assert "another person" not in alone.page.text  # unless the study says so
+    alone.get("/withdraw")
+    token = {"csrf_token": alone.form("confirm")["csrf_token"]}
+    assert alone.http.post("/another", data=token).status_code == 403
+
+
+def test_going_on_with_another_device(app, person):
+    somebody = person().begin().answer(1, -1)
+    somebody.get("/withdraw")
+    code = re.search(r'id="resume-code">(\w+)<', somebody.page.text)[1]
+    elsewhere = person()
+    elsewhere.get("/resume/")
+    elsewhere.send("resume", resume="WRONGCODE2")
+    assert "Nobody was given this code" in elsewhere.page.text
+    elsewhere.send("resume", resume=f"{code[:5].lower()} {code[5:]}")
+    assert elsewhere.path == "/question" and "Question 3 <span>" in elsewhere.page.text
+    assert elsewhere.answer(2).answers == [1, -1, 2]
+    other = person().begin()
+    other.get(f"/resume/{code}")
+    other.send("resume")
+    assert other.path == "/question" and other.answers == []  # their own, not the other's
+    assert "in the middle of another" in other.page.text
 
 
 def test_several_people_at_once_and_one_who_clicks_wildly(app, person):

@@ -18,6 +18,7 @@ POSTS = [
     "/familiarity",
     "/question",
     "/withdraw",
+    "/resume/",
     "/another",
     "/dashboard/login",
     "/dashboard/logout",
@@ -51,6 +52,8 @@ OPEN = [
     "/thanks",
     "/withdraw",
     "/withdrawn",
+    "/resume/",
+    "/resume/P0001",
     "/closed",
     "/study.css",
     "/dashboard/login",
@@ -209,7 +212,8 @@ def test_hostile_labels_are_escaped(tmp_path, write_study, request):
 def test_hostile_input_comes_back_escaped(person):
     somebody = person()
     somebody.get("/withdraw")
-    assert "<b>x" not in somebody.send("code", code="<b>x").text
+    assert "<b>x" not in somebody.send("code", code="<b>x", confirm="yes").text
+    assert "<b>x" not in somebody.get("/resume/<b>x").text
     assert "<b>x" not in somebody.get("/<b>x").text
 
 
