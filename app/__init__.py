@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from flask import Flask
@@ -18,6 +19,8 @@ def create_app(
     *,
     simulated: bool = False,
     enrolments: int = 100,
+    trusted_hosts: Sequence[str] = (),
+    metrics_token: str | None = None,
 ) -> Flask:
     """Make the WSGI application of the study in `study_dir` (a folder with a manifest.json).
 
@@ -26,8 +29,10 @@ def create_app(
         creation, and a database of the other kind is refused.
     enrolments: how many people may begin from one address within ten minutes, in each worker, and
         ten times that from all together; 0 for no limit. Programs have none.
+    trusted_hosts: names under which the server is asked; others are refused. Any where empty.
+    metrics_token: who shows it may read /metrics; nobody without one.
     """
-    from app import dashboard, questionnaire, security, web
+    from app import dashboard, monitoring, questionnaire, security, web
     from app.database import Database
     from app.simulation import views as simulation
     from app.study import Study
@@ -47,8 +52,10 @@ def create_app(
     app.extensions["newcomers"] = (
         security.Limiter(enrolments, 600) if enrolments and not simulated else None
     )
+    app.config.update(HOSTS=tuple(trusted_hosts), METRICS_TOKEN=metrics_token)
     security.init(app)
     web.init(app)
+    app.register_blueprint(monitoring.blueprint)
     app.register_blueprint(questionnaire.blueprint)
     app.register_blueprint(dashboard.blueprint)
     if simulated:

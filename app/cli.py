@@ -12,6 +12,8 @@ VERBS = {
     "power": "app.commands.power",
     "serve": "app.commands.serve",
     "simulate": "app.commands.simulate",
+    "archive": "app.commands.archive",
+    "restore": "app.commands.restore",
     "analyse": "app.commands.analyse",
     "posterior": "app.commands.posterior",
     "profile": "app.commands.profile",
@@ -20,7 +22,6 @@ VERBS = {
     "judge": "app.commands.judge",
     "montecarlo": "app.commands.montecarlo",
     "harmonics": "app.commands.harmonics",
-    "illumination": "app.commands.illumination",
     "cache": "app.commands.cache",
 }
 

@@ -53,7 +53,7 @@ class Database:
         try:
             engine = connect(url)
             with engine.connect() as connection:
-                _migrate(connection)
+                migrate(connection)
         except (NoSuchModuleError, ModuleNotFoundError) as error:
             raise InputError(
                 f"{shown}: there is no driver for such a database here ({error}); "
@@ -197,7 +197,8 @@ def _begin_postgresql(connection) -> None:
         connection.exec_driver_sql("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
 
 
-def _migrate(connection) -> None:
+def migrate(connection: Connection) -> None:
+    """Bring a database to the newest schema; an empty one gets it."""
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
     config.attributes["connection"] = connection.execution_options(writes=True)

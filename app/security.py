@@ -12,9 +12,10 @@ import time
 from collections import defaultdict, deque
 from datetime import timedelta
 
-from flask import Flask, Response, request
+from flask import Flask, Response, abort, current_app, request
 from flask.sessions import SecureCookieSessionInterface
 from flask_wtf import CSRFProtect
+from werkzeug.sansio.utils import host_is_trusted
 
 CONTENT_POLICY = "; ".join(
     (
@@ -102,8 +103,15 @@ def init(app: Flask) -> None:
         MAX_CONTENT_LENGTH=64 * 1024,
     )
     app.session_interface = _Sessions()
+    app.before_request(_refuse_other_hosts)  # before anything else looks at the request
     CSRFProtect(app)
     app.after_request(_headers)
+
+
+def _refuse_other_hosts() -> None:
+    hosts = current_app.config["HOSTS"]  # Flask's TRUSTED_HOSTS leaves no page to say so
+    if hosts and not host_is_trusted(request.host, hosts):
+        abort(400, "This server is not asked under this name.")
 
 
 def _headers(response: Response) -> Response:

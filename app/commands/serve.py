@@ -1,12 +1,35 @@
 """`subdermal serve`: the questionnaire and the dashboard of a study folder."""
 
 import os
+import tomllib
 from pathlib import Path
 
 import click
 
 
-@click.command()
+def _read_config(ctx: click.Context, parameter: click.Parameter, value: Path | None) -> None:
+    """Take the options of a TOML file for defaults; a name that is none is refused."""
+    if value is None:
+        return
+    from app.errors import InputError
+
+    try:
+        settings = tomllib.loads(value.read_text("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{value}: is no TOML ({error})") from None
+    options = {
+        option.removeprefix("--").replace("-", "_"): one.name
+        for one in ctx.command.params
+        for option in one.opts
+        if option.startswith("--") and one is not parameter
+    }
+    for name in settings:
+        if name.replace("-", "_") not in options:
+            raise InputError(f"{value}: {name} is no option; expected {', '.join(sorted(options))}")
+    ctx.default_map = {options[name.replace("-", "_")]: value for name, value in settings.items()}
+
+
+@click.command(context_settings={"auto_envvar_prefix": "SUBDERMAL_SERVE"})
 @click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
 @click.option(
     "--host",
@@ -41,6 +64,27 @@ import click
     help="People who may begin from one address within ten minutes; 0 for no limit.",
 )
 @click.option(
+    "--trusted-host",
+    "trusted_hosts",
+    multiple=True,
+    metavar="NAME",
+    help="Name under which the server may be asked, such as study.example; others are refused.",
+)
+@click.option(
+    "--metrics-token",
+    metavar="TOKEN",
+    help="Who sends it may read /metrics; best given as SUBDERMAL_SERVE_METRICS_TOKEN.",
+)
+@click.option(
+    "--config",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    is_eager=True,
+    expose_value=False,
+    callback=_read_config,
+    metavar="FILE",
+    help="These options in TOML, without dashes: port = 80. Those given here go before.",
+)
+@click.option(
     "--reset-password",
     is_flag=True,
     help="Set a new dashboard password, show it once, and end every login.",
@@ -60,12 +104,15 @@ def command(
     workers: int,
     database: str | None,
     enrolments: int,
+    trusted_hosts: tuple[str, ...],
+    metrics_token: str | None,
     reset_password: bool,
     trusted_proxy: str | None,
 ) -> None:
     """Serve the questionnaire and the dashboard of the study in DIR (a folder with a
     manifest.json).
 
+    Every option may also stand in the environment, --port as SUBDERMAL_SERVE_PORT, or in a file.
     The dashboard's password is made at the first start and shown once. Simulated participants of
     the same study, if there are any, are under /simulated/.
     """
@@ -73,11 +120,12 @@ def command(
 
     from app import create_app, password, server
 
-    app = create_app(directory, database, enrolments=enrolments)
+    settings = {"trusted_hosts": trusted_hosts, "metrics_token": metrics_token}
+    app = create_app(directory, database, enrolments=enrolments, **settings)
     study, answers = app.extensions["study"], app.extensions["database"]
     application, simulated = app, (study.directory / "simulated.sqlite3").is_file()
     if simulated:
-        twin = create_app(directory, simulated=True)
+        twin = create_app(directory, simulated=True, **settings)
         application = DispatcherMiddleware(app, {"/simulated": twin})
     proxy = {}
     if trusted_proxy:

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import case, func, select
+from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -264,8 +264,6 @@ def sides(db: Session, study: Study) -> dict[str, Any]:
     for side, column in (("left", Trial.left), ("right", Trial.right)):
         for name, count in db.execute(export.counted(column, func.count()).group_by(column)):
             shown[name][side] = count
-    sign = case((Response.answer < 0, "left"), (Response.answer > 0, "right"), else_="neither")
-    preferred = dict(db.execute(export.counted(sign, func.count()).group_by(sign)).all())
     given = dict(
         db.execute(export.counted(Response.answer, func.count()).group_by(Response.answer)).all()
     )
@@ -274,7 +272,11 @@ def sides(db: Session, study: Study) -> dict[str, Any]:
             {"label": condition.label, "name": condition.name, **shown[condition.name]}
             for condition in study.definition.techniques
         ],
-        "preferred": {side: preferred.get(side, 0) for side in ("left", "neither", "right")},
+        "preferred": {
+            "left": sum(count for value, count in given.items() if value < 0),
+            "neither": given.get(0, 0),
+            "right": sum(count for value, count in given.items() if value > 0),
+        },
         "given": [
             {"label": level.label, "count": given.get(level.value, 0)}
             for level in study.definition.scale

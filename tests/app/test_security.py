@@ -5,6 +5,7 @@ import re
 import pytest
 from flask import url_for
 from sqlalchemy import select
+from sqlalchemy.exc import OperationalError
 
 from app import create_app, password
 from app.models import StudyRecord
@@ -56,6 +57,8 @@ OPEN = [
     "/resume/P0001",
     "/closed",
     "/study.css",
+    "/health",
+    "/metrics",
     "/dashboard/login",
     "/simulation/",
     "/simulation/status.json",
@@ -281,6 +284,33 @@ def test_the_limiter_forgets_with_time_and_after_success(monkeypatch):
 def test_the_limiter_also_counts_everybody_together():
     limiter = Limiter(attempts=2, window_s=10)
     assert [limiter.allow(str(i)) for i in range(21)] == [True] * 20 + [False]
+
+
+def test_hosts_that_are_not_trusted_are_refused(study_dir):
+    http = create_app(study_dir, trusted_hosts=["study.example"]).test_client()
+    assert http.get("/", headers={"Host": "study.example"}).status_code == 200
+    for host in ("evil.example", "study.example.evil.example", "127.0.0.1", ""):
+        page = http.get("/", headers={"Host": host})
+        assert page.status_code == 400 and "evil" not in page.text
+
+
+def test_health_and_metrics_say_no_more_than_they_should(study_dir, person, app, monkeypatch):
+    assert app.test_client().get("/metrics").status_code == 404
+    person().begin().answer(1)
+    http = create_app(study_dir, metrics_token="secret").test_client()
+    assert http.get("/health").json == {"status": "ok"}
+    for wrong in ({}, {"Authorization": "Bearer"}, {"Authorization": "Bearer s\u00e9cret"}):
+        assert http.get("/metrics", headers=wrong).status_code == 401
+    told = http.get("/metrics", headers={"Authorization": "Bearer secret"}).text
+    assert "\nsubdermal_answers 1\n" in told and "\nsubdermal_participants_total 1\n" in told
+    assert told.count("# TYPE") == 7 and "P0001" not in told
+
+    def gone(*_):
+        raise OperationalError("SELECT", {}, Exception("secret address"))
+
+    monkeypatch.setattr("app.database.Database.read", gone)
+    failed = app.test_client().get("/health")
+    assert (failed.status_code, failed.json) == (503, {"status": "no database"})
 
 
 def test_logging_out(experimenter):

@@ -173,6 +173,16 @@ def test_the_password_is_shown_once_and_opens_both_dashboards(study_dir, serve):
         assert log_in(http, new.url, new.find("password")) == "/dashboard/"
 
 
+def test_options_stand_in_a_file_or_in_the_environment(study_dir, tmp_path, serve, monkeypatch):
+    (tmp_path / "serve.toml").write_text('trusted-host = ["study.example"]\nworkers = 1\n')
+    monkeypatch.setenv("SUBDERMAL_SERVE_METRICS_TOKEN", "of-the-environment")
+    server = serve(study_dir, "--config", tmp_path / "serve.toml")
+    headers = {"Host": "study.example", "Authorization": "Bearer of-the-environment"}
+    assert httpx.get(f"{server.url}metrics", headers=headers).status_code == 200
+    assert httpx.get(server.url).status_code == 400
+    assert "of-the-environment" not in server.printed
+
+
 def test_without_a_simulation_there_is_no_simulated_study(study_dir, serve):
     server = serve(study_dir)
     assert "simulated" not in server.printed
@@ -180,6 +190,8 @@ def test_without_a_simulation_there_is_no_simulated_study(study_dir, serve):
 
 
 def test_what_cannot_be_served_gets_one_line(study_dir, tmp_path, capsys):
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text("prot = 80\n")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         failures = [
             ([study_dir, "--port", taken.getsockname()[1]], "Address already in use"),
@@ -188,6 +200,8 @@ def test_what_cannot_be_served_gets_one_line(study_dir, tmp_path, capsys):
             ([tmp_path / "nothing"], "manifest.json"),
             ([study_dir, "--database", "nonsense"], "expected an SQLAlchemy URL"),
             ([study_dir, "--port", "seven"], "'seven' is not a valid integer"),
+            ([study_dir, "--config", wrong], "prot is no option; expected database"),
+            ([study_dir, "--config", study_dir / "manifest.json"], "is no TOML"),
         ]
         for arguments, says in failures:
             assert main(["serve", *map(str, arguments)]) == 2
