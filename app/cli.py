@@ -22,6 +22,7 @@ VERBS = {
     "judge": "app.commands.judge",
     "montecarlo": "app.commands.montecarlo",
     "harmonics": "app.commands.harmonics",
+    "illumination": "app.commands.illumination",
     "cache": "app.commands.cache",
 }
 

@@ -55,6 +55,8 @@ class World:
         self.positions = np.vstack([b.positions for b in bodies]).astype(float)
         self.normals = np.vstack([b.normals for b in bodies]).astype(float)
         self.albedo = np.vstack([b.albedo for b in bodies]).astype(float)
+        own = [_own(b.positions, item.pose) for b, item in zip(bodies, items, strict=True)]
+        self.own = np.vstack(own)  # positions along each object's own axes, mm
         self.body = np.repeat(np.arange(len(bodies)), [len(b.faces) for b in bodies])
         eye = Shading(model="lambert", albedo=(0.5, 0.5, 0.5))
         materials = [item.primitive.material.value for item in found.surfaces]
@@ -99,6 +101,12 @@ class World:
         for towards, irradiance in self.tracer.lit(hits.points, hits.normals, 1, rng):
             total += reflected(hits.at, hits.normals, towards, towards_eye, irradiance)
         return total
+
+
+def _own(positions: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Positions (N, 3) in the world along an object's axes, mm of the world."""
+    turn = pose[:3, :3] / np.linalg.norm(pose[:3, 0])
+    return (positions - pose[:3, 3]) @ turn
 
 
 def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:

@@ -24,15 +24,16 @@ DEPTH = 6
 class Node:
     """A ray of a tree. parent: place of the ray that it comes from, -1 for the eye's.
 
-    kind: "eye", "reflected" or "refracted"; start, end (3,) mm (end None: it leaves); share (3,) of
-    the pixel that it brings; brings (3,): the radiance of the local model at its end, times share;
-    body: place of the body that it meets, -1 for none.
+    kind: "eye", "reflected" or "refracted"; start, end (3,) mm (end None: it leaves); towards (3,):
+    unit vector; share (3,) of the pixel that it brings; brings (3,): the radiance of the local
+    model at its end, times share; body: place of the body that it meets, -1 for none.
     """
 
     parent: int
     kind: str
     level: int
     start: np.ndarray
+    towards: np.ndarray
     end: np.ndarray | None
     share: np.ndarray
     brings: np.ndarray
@@ -109,9 +110,16 @@ def _level(world, rays, level, even, total, tree) -> list[_Rays]:
             ends[ray] = hits.points[k]
         node = len(tree) + np.arange(len(rays.pixel))
         tree += [
-            Node(int(p), rays.kind, level, start, end, share, bring, int(b))
-            for p, start, end, share, bring, b in zip(
-                rays.parent, rays.origins, ends, rays.share, brought, met, strict=True
+            Node(int(p), rays.kind, level, start, d, end, share, bring, int(b))
+            for p, start, d, end, share, bring, b in zip(
+                rays.parent,
+                rays.origins,
+                rays.towards,
+                ends,
+                rays.share,
+                brought,
+                met,
+                strict=True,
             )
         ]
 
@@ -124,9 +132,7 @@ def _level(world, rays, level, even, total, tree) -> list[_Rays]:
     eta = np.where(hits.behind, at.index, 1 / at.index)
     bent, real = refracted(d, hits.normals, eta)
     clear = at.k_t.max(axis=1) > 0
-    # inside, a mirror is what Snell's law leaves: total reflection
-    mirror = np.where(clear_inside[:, None], 0, at.k_r)
-    mirror = np.where((clear & ~real)[:, None], mirror + at.k_t, mirror)
+    mirror = at.k_r + np.where(real[:, None], 0, at.k_t)  # total reflection keeps what would leave
     reflects = mirror.max(axis=1) > 0
     return [
         on(reflects, mirrored(d, hits.normals), 1.0, mirror, "reflected"),

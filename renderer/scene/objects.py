@@ -118,7 +118,9 @@ class Sheet(Object):
 
 @dataclass(frozen=True)
 class Box(Object):
-    """A room: the inner faces of a box, open towards +z; its left and right walls have colours."""
+    """A room: the inner faces of a box, open towards +z unless it is `closed` (a camera is then
+    inside); its left and right walls have colours.
+    """
 
     shape: ClassVar[str] = "box"
 
@@ -131,6 +133,7 @@ class Box(Object):
     right_albedo: tuple[float, float, float] = parameter(
         (0.05, 0.06, 0.63), low=0.0, high=1.0, source="blue, as in Goral et al. 1984"
     )
+    closed: bool = parameter(False, source="open, so that a camera sees in")
 
 
 SHAPES: dict[str, type[Object]] = {

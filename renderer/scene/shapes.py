@@ -131,11 +131,11 @@ def slab(size_mm, cells: int = CELLS) -> Shape:
     return _join([_side(k, size, False, cells) for k in range(6)])
 
 
-def room(size_mm, left, right, other, cells: int = CELLS // 2) -> Shape:
-    """The inner faces of a box, open towards +z; albedo of the left, the right and other walls."""
+def room(size_mm, left, right, other, closed: bool = False, cells: int = CELLS // 2) -> Shape:
+    """The inner faces of a box, open towards +z or closed; albedo of left, right, other walls."""
     size = np.array(size_mm, float)
     parts = []
-    for k in (1, 2, 3, 4, 5):
+    for k in (0, 1, 2, 3, 4, 5) if closed else (1, 2, 3, 4, 5):
         side = _side(k, size, True, cells)
         colour = {2: right, 3: left}.get(k, other)
         colours = np.tile(np.array(colour, float), (len(side.positions), 1))

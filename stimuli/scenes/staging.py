@@ -129,7 +129,8 @@ def _generated(thing: objects.Object, material: Material) -> shapes.Shape:
     if isinstance(thing, objects.Sheet):
         return shapes.slab((*thing.size_mm, thing.thickness_mm))
     if isinstance(thing, objects.Box):
-        return shapes.room(thing.size_mm, thing.left_albedo, thing.right_albedo, material.albedo)
+        walls = (thing.left_albedo, thing.right_albedo, material.albedo)
+        return shapes.room(thing.size_mm, *walls, thing.closed)
     raise TypeError(f"no shape for {type(thing).__name__}")
 
 
