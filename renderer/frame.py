@@ -20,6 +20,7 @@ from renderer.passes.given import draw_given
 from renderer.passes.hair import Hair
 from renderer.passes.lamps import Lamps
 from renderer.passes.pieces import Piece, pieces
+from renderer.passes.points import Points
 from renderer.passes.surfaces import FORMATS, PLACED_FORMATS, Drawn, Surfaces
 from renderer.scene import graph as graphs
 from renderer.scene.camera import Camera
@@ -171,16 +172,18 @@ class Renderer:
         drawn: Drawn,
         domain: str,
         size: tuple[int, int],
-        mesh: gl.Mesh | None = None,
+        points: Points | None = None,
         point_mm: float = 1.0,
         diffuse: str = "lambert",
+        only_irradiance: bool = False,
     ) -> gl.Target:
         """A surface's light over its texture atlas ("ATLAS") or over points on it ("POINTS").
 
-        size: (width, height) in texels; mesh: the points, from `surfaces.points`; point_mm: what a
-        point stands for, finer relief fades; diffuse: how light passes the face. The target has
-        PLACED_FORMATS; the caller frees it. Specular light, and Disney's diffuse, are those towards
-        the subject's front.
+        size: (width, height) in texels; points: from `surfaces.points`, whose size it is; point_mm:
+        what a point stands for, finer relief fades; diffuse: how light passes the face;
+        only_irradiance: specular and transmitted light are left out, which takes two thirds of
+        the time. The target has PLACED_FORMATS; the caller frees it. Specular light, and Disney's
+        diffuse, are those towards the subject's front.
         """
         self.context.make_current()
         target = gl.Target(*size, list(PLACED_FORMATS), depth=domain == "ATLAS")
@@ -189,13 +192,11 @@ class Renderer:
             "camera_position": self.subject + [0.0, 0.0, 1e4],
             "view": np.eye(4),
             "projection": np.eye(4),
-            "points_size": size,
             "point_mm": point_mm,
         }
-        GL.glEnable(GL.GL_PROGRAM_POINT_SIZE)
-        self.surfaces.draw(
-            self.program, self.lamps, self.surroundings, shared, domain, drawn, mesh, diffuse
-        )
+        light = (self.lamps, self.surroundings)
+        rest = (domain, drawn, points, diffuse, only_irradiance)
+        self.surfaces.draw(self.program, *light, shared, *rest)
         return target
 
 
@@ -395,19 +396,7 @@ class Frame:
         for piece in self.pieces(technique):
             with self.scatter(technique, piece) as scattered:
                 light, info = scattered.textures
-                image[piece.image_rows(self.height, s)] = composite(
-                    r.context,
-                    r.program,
-                    light,
-                    self.surface,
-                    self.picture,
-                    self.view,
-                    r.surroundings,
-                    s,
-                    technique.texturing,
-                    technique.diffuse == "conserving",
-                    piece,
-                )
+                image[piece.image_rows(self.height, s)] = self.develop(light, technique, piece)
                 counts = info.read()[piece.own_rows()]
             rows = piece.image_rows(self.height)
             samples[rows] = np.rint(counts[..., 0])
@@ -416,6 +405,25 @@ class Frame:
             del counts
             give_back()
         return Result(image, samples, contrast)
+
+    def develop(
+        self, scattered: gl.Texture, technique: Technique, piece: Piece | None = None
+    ) -> np.ndarray:
+        """The image (H, W, 3) uint8 sRGB of light that a technique has scattered, or a piece."""
+        r = self.renderer
+        return composite(
+            r.context,
+            r.program,
+            scattered,
+            self.surface,
+            self.picture,
+            self.view,
+            r.surroundings,
+            r.supersample,
+            technique.texturing,
+            technique.diffuse == "conserving",
+            piece,
+        )
 
     def time(self, techniques: dict[str, Technique], rounds: int) -> dict[str, np.ndarray]:
         """Seconds that scattering alone takes: name -> (rounds, 2) of wall and CPU time.

@@ -23,10 +23,18 @@ AT_ONCE = 3 * 32768
 
 
 class Mesh:
-    """Vertex attributes (location -> (N, k) array) and triangles (M, 3); without these, points."""
+    """Vertex attributes (location -> (N, k) array) and triangles (M, 3); without these, points.
 
-    def __init__(self, attributes: dict[int, np.ndarray], faces: np.ndarray | None = None):
-        self.vertices = len(next(iter(attributes.values())))
+    vertices: how many, where there are no attributes.
+    """
+
+    def __init__(
+        self,
+        attributes: dict[int, np.ndarray],
+        faces: np.ndarray | None = None,
+        vertices: int = 0,
+    ):
+        self.vertices = len(next(iter(attributes.values()))) if attributes else vertices
         self.vertex_array = GL.glGenVertexArrays(1)
         self._handles = [owned(self, self.vertex_array, _delete_vertex_array)]
         GL.glBindVertexArray(self.vertex_array)

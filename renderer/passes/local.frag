@@ -11,11 +11,14 @@ uniform vec3 emission;
 uniform vec3 mean_radiance;           // of the environment, over all directions: I_a
 
 void main() {
+#if DOMAIN == POINTS
+    if (!take_place()) discard;
+#endif
     vec3 n = normalize(world_normal), v = normalize(camera_position - world);
 #if DOMAIN == SCREEN
     if (!gl_FrontFacing) n = -n;
 #endif
-    vec3 albedo = has_albedo_map == 1 ? from_srgb(texture(albedo_map, uv).rgb) : albedo_colour;
+    vec3 albedo = has_albedo_map == 1 ? from_srgb(map_at(albedo_map, uv).rgb) : albedo_colour;
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
     vec3 irradiance = vec3(0.0), specular = vec3(0.0);
     for (int k = 0; k < lamps; ++k) {

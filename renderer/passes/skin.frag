@@ -156,10 +156,10 @@ vec3 colour(vec3 p, float pixel_mm, float pore_shade, bool mapped, vec3 map) {
 
 // A normal turned by the height map: Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU", doi:10.1080/2151237X.2010.10390651.
 vec3 bumped(vec3 n) {
-    vec3 dx = dFdx(world), dy = dFdy(world);
-    vec2 du = dFdx(uv), dv = dFdy(uv);
-    float here = texture(height_map, uv).r;
-    vec2 rise = height_mm * length(model[0].xyz) * vec2(texture(height_map, uv + du).r - here, texture(height_map, uv + dv).r - here);
+    vec3 dx = step_x, dy = step_y;
+    vec2 du = uv_x, dv = uv_y;
+    float here = map_at(height_map, uv).r;
+    vec2 rise = height_mm * length(model[0].xyz) * vec2(map_at(height_map, uv + du).r - here, map_at(height_map, uv + dv).r - here);
     vec3 across = cross(dy, n), along = cross(n, dx);
     float area = dot(dx, across);
     if (area == 0.0) return n;
@@ -217,6 +217,9 @@ float goes_in_even(float nv, float m) {
 }
 
 void main() {
+#if DOMAIN == POINTS
+    if (!take_place()) discard;
+#endif
     vec3 smooth_n = normalize(world_normal);
     vec3 v = normalize(camera_position - world);
 #if DOMAIN == SCREEN
@@ -227,15 +230,15 @@ void main() {
     vec3 albedo = albedo_colour;
     float m = roughness;
     float shade = 0.0;
-    if (has_albedo_map == 1) albedo = from_srgb(texture(albedo_map, uv).rgb);
+    if (has_albedo_map == 1) albedo = from_srgb(map_at(albedo_map, uv).rgb);
     if (has_normal_map == 1) {
-        vec3 dp1 = dFdx(world), dp2 = dFdy(world);
-        vec2 du1 = dFdx(uv), du2 = dFdy(uv);
+        vec3 dp1 = step_x, dp2 = step_y;
+        vec2 du1 = uv_x, du2 = uv_y;
         vec3 t = dp1 * du2.y - dp2 * du1.y, s = dp2 * du1.x - dp1 * du2.x;
         float longest = max(dot(t, t), dot(s, s));
         if (longest > 0.0) {
             float facing = sign(du1.x * du2.y - du1.y * du2.x);
-            vec3 map = texture(normal_map, uv).xyz * 2.0 - 1.0;
+            vec3 map = map_at(normal_map, uv).xyz * 2.0 - 1.0;
             n = normalize(mat3(t * facing * inversesqrt(longest), s * facing * inversesqrt(longest), smooth_n) * map);
         }
     }
@@ -249,17 +252,18 @@ void main() {
         albedo = colour(local, pixel_mm, shade, has_albedo_map == 1, albedo);
         if (layer_oil > 0.0) m = mix(roughness_dry, roughness_oily, b.y) - 0.08 * a.x + 0.03 * noise((local + noise_origin) / 3.0);
     }
-    if (has_roughness_map == 1) m = clamp(texture(roughness_map, uv).r, 0.12, 0.9);
+    if (has_roughness_map == 1) m = clamp(map_at(roughness_map, uv).r, 0.12, 0.9);
     strength = specular_strength;
-    if (has_specular_map == 1) strength *= texture(specular_map, uv).r;
+    if (has_specular_map == 1) strength *= map_at(specular_map, uv).r;
 #if DOMAIN == SCREEN
     if (dot(n, v) < 0.02) n = normalize(n + v * (0.02 - dot(n, v)));
 #endif
 
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
     vec3 irradiance = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
-    irradiance *= goes_in_even(max(dot(n, v), 0.02), m);
-    vec3 specular = vec3(0.0), through = vec3(0.0);
+    float nv = max(dot(n, v), 0.02);
+    irradiance *= goes_in_even(nv, m);
+    vec3 specular = vec3(0.0), through = vec3(0.0);  // left out with DIFFUSE_ONLY
     float wet = a.x;
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world);
@@ -267,18 +271,23 @@ void main() {
         if (geometric > -0.08 && nl > 0.0) {
             vec3 e = lamp_light(k, world) * nl * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
             irradiance += e * goes_in(n, v, l, m);
+#ifndef DIFFUSE_ONLY
             float lobe = (1.0 - lobe_share) * kelemen(n, v, l, m * lobe_roughness.x, f0) + lobe_share * kelemen(n, v, l, min(m * lobe_roughness.y, 0.9), f0);
             specular += e * lobe * (1.0 - 0.5 * min(shade, 1.0)) * (1.0 - 0.85 * b.w);
+#endif
         }
+#ifndef DIFFUSE_ONLY
         through += transmitted(k, world, smooth_n);
+#endif
     }
+#ifndef DIFFUSE_ONLY
     // panels in the mirror direction, shadowed by the baked openness
     vec3 r = reflect(-v, n);
     float rough = m * 1.1;
-    float nv = max(dot(n, v), 0.02);
     float occlusion = clamp(pow(nv + open_sky, exp2(-16.0 * rough - 1.0)) - 1.0 + open_sky, 0.0, 1.0);  // Lagarde and de Rousiers 2014
     float f = f0 + 0.30 * pow(1.0 - nv, 5.0) * (1.0 - rough);
     specular += environment(r, 2.0 / (rough * rough)) * f * (1.0 - 0.5 * min(shade, 1.0)) * occlusion * (1.0 - 0.9 * b.w);
+#endif
 
     vec3 dark = mix(vec3(1.0), vec3(0.35), b.w);
     float mask = material_id * step(0.5, scatters);

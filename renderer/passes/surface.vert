@@ -1,5 +1,4 @@
-// A surface placed over a domain: the screen, its own texture atlas, or points that are listed one by one.
-// DOMAIN: SCREEN, ATLAS or POINTS. What is shaded there is the same.
+// A surface placed over a domain: the screen or its own texture atlas (points: passes/points.glsl).
 #include "passes/domain.glsl"
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -25,10 +24,7 @@ void main() {
     view_depth = -q.z;
 #if DOMAIN == SCREEN
     gl_Position = projection * q;
-#elif DOMAIN == ATLAS
-    gl_Position = vec4(texture_uv * 2.0 - 1.0, 0.0, 1.0);
 #else
-    gl_Position = point_place(gl_VertexID);
-    gl_PointSize = 1.0;
+    gl_Position = vec4(texture_uv * 2.0 - 1.0, 0.0, 1.0);
 #endif
 }

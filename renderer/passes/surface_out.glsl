@@ -8,15 +8,25 @@ layout(location = 4) out vec4 out_transmitted;   // rgb: irradiance that comes t
 #if DOMAIN != SCREEN
 layout(location = 5) out vec4 out_position;      // xyz: mm in the world, alpha 1
 #endif
+uniform mat4 model;
+#if DOMAIN == POINTS
+#include "passes/points.glsl"
+#else
 in vec3 world; in vec3 local; in vec3 world_normal; in vec2 uv; in vec4 a; in vec4 b; in mat3 light; in float open_sky; in float scatters;
 in float view_depth;
-uniform mat4 model;
+#endif
 
-// Millimetres that a fragment covers: relief finer than that fades out.
+// Millimetres that a fragment covers: relief finer than that fades out. Maps are read by `map_at`: a point's
+// neighbours in the target are not its neighbours on the surface.
 #if DOMAIN == POINTS
-uniform float point_mm;
+#define map_at(map, at) textureGrad(map, at, uv_x, uv_y)
 float footprint_mm() { return point_mm; }
 #else
+#define map_at(map, at) texture(map, at)
+#define step_x dFdx(world)
+#define step_y dFdy(world)
+#define uv_x dFdx(uv)
+#define uv_y dFdy(uv)
 float footprint_mm() {
     vec2 px = vec2(length(dFdx(world)), length(dFdy(world)));
     return max(min(px.x, px.y), 1e-3);

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from renderer import gl
+from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.optics import fits, media, surface
 from renderer.optics.curve import Curve
 from renderer.passes.bake import Baked, bake, body
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
+from renderer.passes.points import COLUMNS, MOST_TRIANGLES, Points, SurfaceLists
 from renderer.scene.graph import Contents, Item
 from renderer.scene.material import LAYERS, MAPS, MODELS, Material, Shading, Skin
 from renderer.scene.model import MASKS
@@ -40,6 +42,7 @@ class Drawn:
     baked: Baked
     id: int = 0
     maps: dict[str, gl.Texture] | None = None
+    lists: SurfaceLists | None = None
 
 
 class Surfaces:
@@ -106,25 +109,34 @@ class Surfaces:
         shared: dict,
         domain: str = "SCREEN",
         only: Drawn | None = None,
-        mesh: gl.Mesh | None = None,
+        points: Points | None = None,
         diffuse: str = "lambert",
+        only_irradiance: bool = False,
     ) -> None:
         """Shade into the bound target: everything, or over a domain `only` one surface.
 
-        shared: camera_position, view, projection (and points_size, point_mm for POINTS);
-        mesh: drawn in the place of the surface's own (points on it); diffuse: how light passes the
-        face (renderer.optics.surface).
+        shared: camera_position, view, projection (and point_mm for POINTS); points: those of the
+        domain POINTS; diffuse: how light passes the face (renderer.optics.surface);
+        only_irradiance: without specular and transmitted light.
         """
         defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": domain}
         values = {**shared, **lamps.uniforms(), **surroundings.uniforms(), "face_table": self.face}
         own = {**defines, "DIFFUSE": surface.DIFFUSE.index(diffuse)}
         values["mean_radiance"] = surroundings.mean()
+        if only_irradiance:
+            own["DIFFUSE_ONLY"] = 1
+        if points is not None:
+            values |= points.uniforms()
         for drawn in self.surfaces if only is None else [only]:
             local = isinstance(drawn.item.primitive.material.value, Shading)
             shader = "passes/local.frag" if local else "passes/skin.frag"
-            program = programs(shader, own, vertex="passes/surface.vert")
+            vertex = "passes/surface.vert" if points is None else "shaders/fullscreen.vert"
+            program = programs(shader, own, vertex=vertex)
             program.use(**program.accepts({**values, **self._material(drawn)}))
-            (mesh or drawn.mesh).draw()
+            if points is None:
+                drawn.mesh.draw()
+            else:
+                gl.draw_fullscreen(gl.Context.current)
         if only is not None:
             return
         program = programs("passes/eye.frag", defines, vertex="passes/surface.vert")
@@ -208,18 +220,22 @@ class Surfaces:
             **(_local(material) if isinstance(material, Shading) else {}),
         }
 
-    def points(self, drawn: Drawn, faces: np.ndarray, weights: np.ndarray) -> gl.Mesh:
-        """Points on a surface as a mesh: triangles (K,) and barycentric weights (K, 3)."""
+    def points(
+        self, drawn: Drawn, faces: np.ndarray, weights: np.ndarray, columns: int = COLUMNS
+    ) -> Points:
+        """Points on a surface: triangles (K,) and barycentric weights (K, 3)."""
         part = drawn.item.primitive
-        corners = part.faces[faces]
-        scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
-        light = drawn.baked.light.reshape(-1, 9)
-        whole = _attributes(part, part.masks, light, drawn.baked.openness[:, None], scatters)
-
-        def at(array: np.ndarray) -> np.ndarray:
-            return np.einsum("kc,kca->ka", weights, np.asarray(array)[corners])
-
-        return gl.Mesh({where: at(array) for where, array in whole.items()})
+        if len(part.faces) > MOST_TRIANGLES:
+            raise InputError(
+                f"a surface has {len(part.faces)} triangles; expected at most {MOST_TRIANGLES} for "
+                "techniques that put points on it"
+            )
+        if drawn.lists is None:
+            scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
+            light, openness = drawn.baked.light.reshape(-1, 9), drawn.baked.openness[:, None]
+            attributes = _attributes(part, part.masks, light, openness, scatters)
+            drawn.lists = SurfaceLists(attributes, part.faces)
+        return Points(drawn.lists, faces, weights, columns)
 
 
 def _local(material: Shading) -> dict:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from renderer import gl
     from renderer.passes.lamps import Lamps
+    from renderer.passes.points import Points
     from renderer.passes.surfaces import Drawn
 
 
@@ -63,16 +64,16 @@ class Inputs:
 class Room:
     """Where a medium's surfaces are, and their light over their atlases or at points on them.
 
-    surfaces: those of the medium at hand; medium: its id. placed(drawn, domain, size, mesh,
+    surfaces: those of the medium at hand; medium: its id. placed(drawn, domain, size, points,
     point_mm): a surface's light over "ATLAS" or "POINTS", see Renderer.placed. points(drawn, faces,
-    weights): a mesh of points on it. camera: the uniforms camera_position, view and projection;
+    weights): points on it. camera: the uniforms camera_position, view and projection;
     depth: the target whose depth buffer holds what is seen; lamps: with the layers of their maps.
     """
 
     surfaces: tuple[Drawn, ...]
     medium: int
     placed: Callable[..., gl.Target]
-    points: Callable[..., gl.Mesh]
+    points: Callable[..., Points]
     camera: dict[str, Any]
     depth: gl.Target
     lamps: Lamps

@@ -25,7 +25,6 @@ from renderer.techniques.base import Inputs, Room, Scattered, Technique
 from renderer.techniques.drawing import result
 
 MOST_POINTS = 4_000_000
-COLUMNS = 1024  # points a row of their textures
 TABLE = 512  # texels of a profile, 256 to 512 in Rohat 2012, sec. 5.1
 
 
@@ -124,7 +123,7 @@ class PointsTechnique(Technique):
             )
         rng = np.random.default_rng([self.seed, drawn.item.mesh])
         points = room.points(drawn, *spread(areas, count, rng))
-        size = (COLUMNS, -(-count // COLUMNS))
+        size = points.size
         placed = room.placed(drawn, "POINTS", size, points, self.spacing_mm)
         try:
             irradiance, _, albedo, _, transmitted, places = placed.textures

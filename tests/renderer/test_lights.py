@@ -254,8 +254,8 @@ def test_light_over_an_atlas_and_at_points_is_that_of_the_screen():
         faces = ball.item.primitive.faces
         chosen = rng.integers(0, len(faces), 200)
         weights = rng.dirichlet([1, 1, 1], 200)
-        mesh = drawing.surfaces.points(ball, chosen, weights)
-        with drawing.placed(ball, "POINTS", (20, 10), mesh) as points:
+        listed = drawing.surfaces.points(ball, chosen, weights, 20)
+        with drawing.placed(ball, "POINTS", (20, 10), listed) as points:
             at, where = (points.textures[k].read().copy() for k in (0, 5))
         # a point's neighbour in the atlas has its light
         flat = place[..., :3].reshape(-1, 3)
