@@ -170,15 +170,21 @@ def dssim(x: np.ndarray, y: np.ndarray) -> float:
     window lies inside the image (Wang et al. 2004, "Image quality assessment: from error visibility
     to structural similarity", doi:10.1109/TIP.2003.819861, eq. 13), by scikit-image.
     """
+    pad = WINDOW // 2
+    return float(dssim_map(x, y)[pad:-pad, pad:-pad].mean())
+
+
+def dssim_map(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(1 - SSIM)/2 about each pixel (H, W), see `dssim`; mirrored where the window is cut."""
     from skimage.metrics import structural_similarity
 
-    if min(x.shape[:2]) < 11:
+    if min(x.shape[:2]) < WINDOW:
         raise InputError(
             f"an image of {x.shape[1]} x {x.shape[0]} pixels is too small for DSSIM, expected "
             "11 x 11 or more"
         )
     one, other = (np.asarray(image, float) @ LUMA for image in (x, y))
-    similarity = structural_similarity(
+    _, similarity = structural_similarity(
         one,
         other,
         data_range=1.0,
@@ -187,8 +193,9 @@ def dssim(x: np.ndarray, y: np.ndarray) -> float:
         use_sample_covariance=False,
         K1=0.01,
         K2=0.03,
+        full=True,
     )
-    return float((1 - similarity) / 2)
+    return (1 - similarity) / 2
 
 
 def flip(x: np.ndarray, y: np.ndarray) -> float:
@@ -198,20 +205,21 @@ def flip(x: np.ndarray, y: np.ndarray) -> float:
     Andersson et al. 2020, "FLIP: a difference evaluator for alternating images",
     doi:10.1145/3406183, by its authors' package, at their 67 pixels a degree.
     """
+    return float(flip_map(x, y).mean())
+
+
+def flip_map(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """FLIP of each pixel (H, W), see `flip`."""
     import flip_evaluator
 
-    return float(
-        flip_evaluator.evaluate(
-            np.ascontiguousarray(x, np.float32),
-            np.ascontiguousarray(y, np.float32),
-            "LDR",
-            applyMagma=False,
-        )[1]
-    )
+    both = (np.ascontiguousarray(image, np.float32) for image in (x, y))
+    return flip_evaluator.evaluate(*both, "LDR", applyMagma=False)[0][..., 0]
 
 
-#: Distances to the reference that are computed from the images.
+#: Distances to the reference that are computed from the images, and where in them.
 DISTANCES = {"dssim": dssim, "flip": flip}
+MAPS = {"dssim": dssim_map, "flip": flip_map}
+WINDOW = 11  # pixels a side
 LUMA = np.array([0.299, 0.587, 0.114])  # Rec. 601
 
 

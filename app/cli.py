@@ -7,6 +7,8 @@ import click
 
 VERBS = {
     "render": "app.commands.render",
+    "techniques": "app.commands.techniques",
+    "compare": "app.commands.compare",
     "build": "app.commands.build",
     "strip": "app.commands.strip",
     "power": "app.commands.power",

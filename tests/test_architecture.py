@@ -88,6 +88,7 @@ def test_imports(path):
             | {f"stimuli.{relative.stem}"}
             | ({"renderer", "stimuli.scenes"} if relative.stem == "render" else set())
             | ({"renderer.scene"} if relative.stem == "harmonics" else set())
+            | ({"renderer"} if relative.stem == "techniques" else set())
         )
         allowed |= (
             {"renderer.errors", "renderer.caches", "renderer.optics"}

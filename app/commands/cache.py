@@ -17,6 +17,10 @@ def caches() -> dict[str, tuple[Path, str]]:
             cache_folder(),
             "simulated light in media; simulated again",
         ),
+        "reference": (
+            folder() / "reference",
+            "walks of long reference renders; walked again",
+        ),
     }
 
 
@@ -37,8 +41,8 @@ def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
 @click.option(
     "--clear",
     metavar="NAME",
-    type=click.Choice(["heads", "montecarlo"]),
-    help="Remove this cache: heads or montecarlo. Nothing in it is lost for good.",
+    type=click.Choice(["heads", "montecarlo", "reference"]),
+    help="Remove this cache by its name. Nothing in it is lost for good.",
 )
 def command(clear: str | None) -> None:
     """List the caches: where each is, and how large.

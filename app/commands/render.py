@@ -7,14 +7,14 @@ import click
 SIZE = "WIDTHxHEIGHT"
 
 
-def _size(_context, _parameter, value: str) -> tuple[int, int]:
+def size_of(_context, _parameter, value: str) -> tuple[int, int]:
     width, cross, height = value.lower().partition("x")
     if not (cross and width.isdigit() and height.isdigit()):
         raise click.BadParameter(f"got {value!r}; expected {SIZE}, such as 1920x1080")
     return int(width), int(height)
 
 
-def _parameter(_context, _parameter, values: tuple[str, ...]) -> dict:
+def parameters_of(_context, _parameter, values: tuple[str, ...]) -> dict:
     import json
 
     chosen = {}
@@ -29,7 +29,7 @@ def _parameter(_context, _parameter, values: tuple[str, ...]) -> dict:
     return chosen
 
 
-def _patch(_context, _parameter, values: tuple[str, ...]) -> dict:
+def patch_of(_context, _parameter, values: tuple[str, ...]) -> dict:
     """--set a.b=1 --set c=text as {"a": {"b": 1}, "c": "text"}."""
     import json
 
@@ -79,7 +79,7 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     default="1920x1080",
     show_default=True,
     metavar=SIZE,
-    callback=_size,
+    callback=size_of,
     help="Size of the image in pixels.",
 )
 @click.option(
@@ -95,7 +95,7 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     "parameters",
     multiple=True,
     metavar="NAME=VALUE",
-    callback=_parameter,
+    callback=parameters_of,
     help="A parameter of the technique, value in JSON; repeat for more.",
 )
 @click.option(
@@ -109,7 +109,7 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     "patches",
     multiple=True,
     metavar="KEY=VALUE",
-    callback=_patch,
+    callback=patch_of,
     help=(
         "A value over the scene's, by its dotted key, in JSON or as text: rig=noon, "
         "camera.yaw_deg=0, lights.rim=false; repeat for more."

@@ -15,6 +15,7 @@ from renderer.techniques.gosselin import Gosselin
 from renderer.techniques.jimenez_gaussian import JimenezGaussian
 from renderer.techniques.jimenez_separable import JimenezSeparable
 from renderer.techniques.none import NoScattering
+from renderer.techniques.reference import Reference
 from renderer.techniques.splat_dipole import SplatDipole
 
 TECHNIQUES: dict[str, type[Technique]] = {
@@ -27,6 +28,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "gosselin": Gosselin,
     "deon_luebke": DeonLuebke,
     "splat_dipole": SplatDipole,
+    "reference": Reference,
 }
 
 

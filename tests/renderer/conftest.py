@@ -28,8 +28,8 @@ def studio(model, **patch):
 
 
 def small(name):
-    """A technique as it is, but for the size of its atlas or the number of its points."""
-    fewer = {"atlas": {"size": 256}, "points": {"spacing_mm": 4.0}}
+    """A technique as it is, but for the size of its atlas, the number of its points or walks."""
+    fewer = {"atlas": {"size": 256}, "points": {"spacing_mm": 4.0}, "walks": {"walks": 2}}
     return package.make(name, fewer.get(package.TECHNIQUES[name].domain, {}))
 
 

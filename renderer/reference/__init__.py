@@ -1,0 +1,1 @@
+"""The judge: light walked at random through the same medium, mesh and light; no OpenGL in here."""
