@@ -43,7 +43,8 @@ PARTICIPANTS = (
         "same_answer_share",
         "median_rt_ms",
     ),
-    *("circular_triads", "zeta", "repeats", "repeat_share", "agreement_with_others", "excluded"),
+    *("circular_triads", "zeta", "repeats", "repeat_share", "traps", "trap_share"),
+    *("agreement_with_others", "excluded"),
 )
 #: Chance with which a one-sided person must be incompatible before `Exclusions.one_side_share`
 #: applies.
@@ -57,6 +58,7 @@ ENOUGH = {
     "same_answer_share": (10, "answers"),
     "zeta": (10, "triads answered in full"),
     "repeat_share": (5, "questions that prefer one both times they are asked"),
+    "trap_share": (1, "trap pairs"),
 }
 
 
@@ -180,6 +182,12 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
         if len(both)
         else np.zeros(len(table), int),
     }
+    traps = responses.checks[responses.checks.kind == "trap"]
+    obvious = np.sign(traps.answer.astype(float)) == np.sign(traps.expected.astype(float))
+    found = obvious.groupby(traps.participant.astype(str))
+    table["traps"] = found.size().reindex(table.index, fill_value=0).astype(int)
+    table["trap_share"] = found.mean().reindex(table.index).astype(float)
+    given["trap_share"] = table.traps.to_numpy()
 
     preference = np.concatenate(
         [np.where(panel.answered, panel.preference, 0) for panel in parts], axis=1
@@ -317,6 +325,7 @@ def _excluded(
         "zeta": rules.zeta is not None and table.zeta < (rules.zeta or 0),
         "repeat_share": rules.repeat_share is not None
         and table.repeat_share < (rules.repeat_share or 0),
+        "trap_share": rules.trap_share is not None and table.trap_share < (rules.trap_share or 0),
     }
     hits = {name: np.broadcast_to(np.asarray(hit), len(table)) for name, hit in checks.items()}
     hits |= {name: hits[name] & (given[name] >= least) for name, (least, _) in ENOUGH.items()}
@@ -342,6 +351,7 @@ def rules_in_words(options: Options) -> str:
         "same_answer_share": "the same answer at least {:.0%} of the time",
         "zeta": "zeta under {:g}",
         "repeat_share": "under {:.0%} alike when asked again",
+        "trap_share": "under {:.0%} of the trap pairs answered as is obvious",
     }
     texts = {
         name: text.format(getattr(options.exclusions, name)).replace("%", " %")

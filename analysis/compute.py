@@ -52,8 +52,8 @@ what the levels hold, under the name 'all'.
     side_balance    framing,technique,left,right,left_share,p,holm_p
                     on which side each technique stood
     participants    participant,familiarity,answers,left,none,right,side_p,same_answer_share,
-                    median_rt_ms,circular_triads,zeta,repeats,repeat_share,agreement_with_others,
-                    excluded
+                    median_rt_ms,circular_triads,zeta,repeats,repeat_share,traps,trap_share,
+                    agreement_with_others,excluded
                     excluded: the rule that fires, or ''
     sensitivity     framing,conclusion,a,b,everyone,without_excluded,changed
                     with and without the excluded

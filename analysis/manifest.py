@@ -27,6 +27,10 @@ MEASURES = {
 }
 #: Labels of the levels 1 to 5 of the self-rating, where the study names none.
 FAMILIARITY = ("1, no familiarity", "2", "3", "4", "5, high familiarity")
+#: What a question is for. `main` counts; `repeat` and `swapped` ask a main pair again, on the same
+#: and on the other sides; `practice` comes first; `trap` has an obvious answer; `bias` shows one
+#: image on both sides. Without a column that says so, all are `main`.
+KINDS = ("main", "practice", "repeat", "swapped", "trap", "bias")
 #: [left, top, right, bottom] of an image, from 0 to 1, where all of it is meant.
 WHOLE = (0.0, 0.0, 1.0, 1.0)
 

@@ -27,6 +27,7 @@ class Exclusions:
     zeta                ... whose coefficient of consistency, averaged over framings, is below this,
                         at most 1
     repeat_share        ... who, asked again, chose the same direction less often than this, 0 to 1
+    trap_share          ... who answered less than this share of trap pairs as is obvious, 0 to 1
     """
 
     answered_share: float | None = 0.5
@@ -35,9 +36,13 @@ class Exclusions:
     same_answer_share: float | None = 0.95
     zeta: float | None = None
     repeat_share: float | None = None
+    trap_share: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("answered_share", "one_side_share", "same_answer_share", "repeat_share"):
+        for name in (
+            *("answered_share", "one_side_share", "same_answer_share", "repeat_share"),
+            "trap_share",
+        ):
             _within(f"exclusions.{name}", getattr(self, name), 0, 1)
         _within("exclusions.median_rt_ms", self.median_rt_ms, 0, float("inf"))
         _within("exclusions.zeta", self.zeta, -1, 1)

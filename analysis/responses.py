@@ -21,6 +21,7 @@ from analysis import codebook as codebooks
 from analysis import delimited
 from analysis.codebook import FRAMING, Codebook
 from analysis.errors import InputError
+from analysis.manifest import KINDS
 from analysis.options import FEWEST_PEOPLE
 
 #: Columns that identify an answer or value it; without them it cannot be counted.
@@ -32,7 +33,10 @@ REQUIRED = (
     *("participant", "familiarity", "framing", "left", "right", "answer"),
     *("order", "rt_ms", "started_at"),
 )
-OPTIONAL = ("simulated", "study", "study_version")
+OPTIONAL = ("simulated", "study", "study_version", "kind", "expected")
+#: Those whose answers say how a person looks, and nothing of the techniques.
+CHECKING = ("practice", "trap", "bias")
+CHECKS = ("participant", "kind", "left", "right", "answer", "expected")
 REPEATS = ("participant", "framing", "a", "b", "preference", "first_preference")
 #: Columns of an answer that no answers can be grouped by.
 NO_FACTOR = ("participant", "left", "right", "answer", "order", "rt_ms", "started_at")
@@ -106,6 +110,9 @@ class Responses:
     missing has one entry for each value of `MEASURED` that is not there; findings one for each row
     that is not counted.
 
+    checks has one row for each answer of a kind in `CHECKING`, which is not counted:
+        participant, kind, left, right, answer (-2 to 2), expected (its expected sign, NaN for none)
+
     repeats has one row for each question that a participant was asked again (the same pair under
     another `order`; it is not counted):
         participant, framing, a, b, preference (the later answer), first_preference (the one that
@@ -123,6 +130,7 @@ class Responses:
     sha256: str = ""
     grouping: tuple[str, ...] = ()
     repeats: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=REPEATS))
+    checks: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=CHECKS))
 
     @cached_property
     def items(self) -> dict[str, tuple[str, ...]]:
@@ -271,6 +279,7 @@ def _tidy(
     further: tuple[str, ...],
 ) -> Responses:
     rows = len(raw) + len(findings)
+    raw, checks = _apart(raw)
     columns = tuple(column for column in MEASURED if column not in raw)
     for column in columns:
         raw[column] = ""
@@ -361,11 +370,13 @@ def _tidy(
             *grouping,
             *(dialect.notes if dialect else ()),
             *([f"Understood in it: {'; '.join(understood)}."] if understood else []),
+            *_check_notes(checks),
             *_missing_notes(missing, columns, len(frame)),
             *_crossed_note(int(again.sum()), rows, dialect, further, factor),
             *_notes(frame, raw, codebook),
         ),
         grouping=grouping,
+        checks=checks,
         simulated=simulated,
         rows=rows,
         source=Path(name).name,
@@ -521,6 +532,9 @@ def _checked(
     checks.append(("answer", ~values.answer.between(-2, 2), "an integer from -2 to 2"))
     if factor not in REQUIRED:
         checks.append(("level", raw.level == "", "a level to group answers by"))
+    if "kind" in raw:
+        known = f"one of {', '.join(KINDS)}"
+        checks.append(("kind", ~raw.kind.isin((*KINDS, "")), known))
     if "simulated" in raw:
         checks.append(("simulated", ~raw.simulated.isin(["0", "1"]), "0 or 1"))
     if codebook is not None:
@@ -559,6 +573,36 @@ def _checked(
                 if at not in reasons
             ]
     return reasons, missing
+
+
+def _apart(raw: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows that are judged, and `Responses.checks`."""
+    if "kind" not in raw or not (apart := raw.kind.isin(CHECKING)).any():
+        return raw, pd.DataFrame(columns=CHECKS)
+    checks = raw[apart].copy()
+    for column in ("answer", "expected"):
+        checks[column] = pd.to_numeric(checks.get(column, ""), errors="coerce")
+    checks = checks[checks.answer.between(-2, 2)]
+    return raw[~apart].reset_index(drop=True), checks[list(CHECKS)].reset_index(drop=True)
+
+
+def _check_notes(checks: pd.DataFrame) -> Iterable[str]:
+    """What the answers say that are not counted."""
+    for kind in CHECKING:
+        here = checks[checks.kind == kind]
+        if here.empty:
+            continue
+        said = ""
+        if kind == "trap":
+            right = int((np.sign(here.answer) == np.sign(here.expected)).sum())
+            said = f": {right} of them are the obvious one"
+        elif kind == "bias":
+            left, none = int((here.answer < 0).sum()), int((here.answer == 0).sum())
+            said = (
+                f" (one image on both sides): {none} see no difference, {left} prefer the left, "
+                f"{len(here) - none - left} the right"
+            )
+        yield f"{_plural(len(here), 'answer')} to {kind} pairs stand apart and count nowhere{said}."
 
 
 def _without_level(

@@ -25,7 +25,14 @@ def assign(study: Study, participant: Participant) -> list[Trial]:
             cell=trial.cell,
             left=trial.left,
             right=trial.right,
+            kind=trial.kind,
             seed=f"{study.seed}/{participant.id}",
         )
-        for trial in trials(study.cells, study.techniques, study.seed, participant.id)
+        for trial in trials(
+            study.cells,
+            study.techniques,
+            study.seed,
+            participant.id,
+            study.definition.quality,
+        )
     ]

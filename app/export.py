@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from sqlalchemy import ColumnElement, Select, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, selectinload
 
 from analysis.files import replacing
+from analysis.manifest import KINDS
 from app import recruiting
 from app.models import Participant, Response, Trial
 from app.study import Study
+from stimuli.asking import Ask
 from stimuli.study import FRAMING
 
 CHUNK_ROWS = 500
@@ -101,6 +103,29 @@ COLUMNS = (
             "seen, 1 slightly right, 2 clearly right"
         ),
         lambda r: r.response.answer,
+    ),
+    Column(
+        "kind",
+        "text",
+        ", ".join(KINDS),
+        (
+            "What the question is for: main counts; repeat and swapped ask a pair again, on the "
+            "same and on the other sides; practice comes first; trap has an obvious answer; bias "
+            "shows one image on both sides"
+        ),
+        lambda r: r.trial.kind,
+    ),
+    Column(
+        "expected",
+        "integer",
+        "-1, 0, 1",
+        (
+            "Sign of the answer that is expected where one is: of traps the side of the better "
+            "image, of bias 0; else empty"
+        ),
+        lambda r: r.study.definition.quality.expected(
+            r.trial.kind, r.trial.cell, r.trial.left, r.trial.right
+        ),
     ),
     Column(
         "order",
@@ -301,6 +326,20 @@ COLUMNS = (
         lambda r: r.response.seen_share,
     ),
     Column(
+        "reason_ticks",
+        "text",
+        "numbers from 1, with ; between them",
+        "The words of the study that were ticked as a reason for the choice; empty for none",
+        lambda r: r.response.reason_ticks,
+    ),
+    Column(
+        "reason_text",
+        "text",
+        "as it was written",
+        "A reason for the choice in the participant's words; empty for none",
+        lambda r: r.response.reason_text,
+    ),
+    Column(
         "rt_server_ms",
         "integer",
         "ms",
@@ -352,7 +391,23 @@ def columns(study: Study) -> tuple[Column, ...]:
         )
         for factor in study.definition.factors[1:]
     ]
-    return (*COLUMNS[:place], *further, *COLUMNS[place:])
+    asked = study.definition
+    own = [_own(ask, "before") for ask in asked.before] + [
+        _own(ask, "after") for ask in asked.after
+    ]
+    return (*COLUMNS[:place], *further, *COLUMNS[place:], *own)
+
+
+def _own(ask: Ask, when: str) -> Column:
+    """The column of a question of the study's own."""
+    values = ", ".join(f"{k}: {label}" for k, label in enumerate(ask.options, 1) if label)
+    return Column(
+        ask.name,
+        "integer" if ask.options else "text",
+        values or "as it was written",
+        f"Asked {when} the pairs: {ask.text} Empty where it was left out",
+        lambda r: next((s.value for s in r.participant.statements if s.name == ask.name), ""),
+    )
 
 
 def counted(*columns: Any, who: ColumnElement[bool] | None = None) -> Select:
@@ -378,6 +433,7 @@ def records(
 ) -> Iterator[dict[str, Any]]:
     """The rows of the table, by participant and order, as mappings."""
     query = counted(Participant, Trial, Response, who=who).order_by(Participant.id, Trial.order)
+    query = query.options(selectinload(Participant.statements))
     described = columns(study)
     for participant, trial, response in session.execute(
         query.execution_options(yield_per=CHUNK_ROWS)
@@ -400,12 +456,15 @@ def judgements(session: Session, study: Study) -> list[dict[str, Any]]:
         Trial.order,
         Response.answer,
         Response.rt_ms,
+        Trial.kind,
     )
-    names = ("participant", "familiarity", "left", "right", "order", "answer", "rt_ms")
+    names = ("participant", "familiarity", "left", "right", "order", "answer", "rt_ms", "kind")
+    expected = study.definition.quality.expected
     return [
-        dict(zip(names, (f"P{number:04d}", rating, left, right, order, answer, rt_ms)))
+        dict(zip(names, (f"P{number:04d}", rating, left, right, order, answer, rt_ms, kind)))
+        | {"expected": expected(kind, cell, left, right)}
         | levels[cell]
-        for number, rating, cell, left, right, order, answer, rt_ms in session.execute(
+        for number, rating, cell, left, right, order, answer, rt_ms, kind in session.execute(
             query.order_by(Participant.id, Trial.order)
         )
     ]
@@ -485,6 +544,7 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
             for level in factor.levels
         ),
         *(f"- technique `{condition.name}`: {condition.label}" for condition in asked.techniques),
+        *(f"- reason {place}: {tick}" for place, tick in enumerate(asked.reason.ticks, 1)),
         "",
         f"Familiarity: {asked.familiarity.question}",
         "",

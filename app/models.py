@@ -120,6 +120,7 @@ class Participant(Base):
     excluded_because: Mapped[str | None] = mapped_column(String(500))
 
     trials: Mapped[list[Trial]] = relationship(order_by="Trial.order", back_populates="participant")
+    statements: Mapped[list[Statement]] = relationship()
 
     @property
     def code(self) -> str:
@@ -139,6 +140,7 @@ class Trial(Base):
     cell: Mapped[str] = mapped_column(String(100))  # names of its levels, joined by dots
     left: Mapped[str] = mapped_column(String(100))
     right: Mapped[str] = mapped_column(String(100))
+    kind: Mapped[str] = mapped_column(String(8), server_default="main")  # analysis.manifest.KINDS
     seed: Mapped[str] = mapped_column(
         String(50)
     )  # "study seed/participant": what the design was drawn from
@@ -187,9 +189,24 @@ class Response(Base):
     pixel_scale_largest: Mapped[float | None]
     seen_share: Mapped[float | None]
     rt_server_ms: Mapped[int | None]
+    reason_ticks: Mapped[str | None] = mapped_column(String(100))  # numbers from 1: "1;3"
+    reason_text: Mapped[str | None] = mapped_column(String(2000))
     rt_reported_ms: Mapped[int | None]  # where it was more than the server's clock allows
 
     trial: Mapped[Trial] = relationship(back_populates="response")
+
+
+class Statement(Base):
+    """An answer to a question of the study's own; "" where it was left out. Only ever appended."""
+
+    __tablename__ = "statements"
+    __table_args__ = (UniqueConstraint("participant_id", "name"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    participant_id: Mapped[int] = mapped_column(ForeignKey("participants.id"))
+    name: Mapped[str] = mapped_column(String(100))
+    value: Mapped[str] = mapped_column(String(2000))
+    at: Mapped[datetime] = mapped_column(default=now)
 
 
 def _count(column: InstrumentedAttribute) -> Any:
@@ -202,6 +219,7 @@ def _count(column: InstrumentedAttribute) -> Any:
 #: question is the one after the last answer.
 Participant.answered = _count(Response.participant_id)
 Participant.questions = _count(Trial.participant_id)
+Participant.stated = _count(Statement.participant_id)
 Participant.study_state = column_property(
     select(StudyRecord.state).where(StudyRecord.id == 1).scalar_subquery(), deferred=True
 )

@@ -105,12 +105,22 @@ class Study:
         filled = {
             "questions": str(questions),
             "minutes": str(low) if low == high else f"{low} to {high}",
-            "recorded": RECORDED,
+            "recorded": self._recorded,
         }
         text = self.definition.consent
         for name, value in filled.items():
             text = text.replace(f"{{{name}}}", value)
         return tuple(text.split("\n\n"))
+
+    @property
+    def _recorded(self) -> str:
+        """What is stored of a participant, with what this study asks beside the pairs."""
+        asked, more = self.definition, ""
+        if own := len(asked.before) + len(asked.after):
+            more += f", your answers to {own} other question{'s' if own > 1 else ''}"
+        if asked.reason.share:
+            more += ", the reasons that you give for a choice"
+        return RECORDED + more
 
     def database_url(self, simulated: bool) -> str:
         return (

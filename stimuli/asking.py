@@ -1,8 +1,14 @@
 """What people are asked beside the pairs, and how they take part."""
 
+import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from stimuli.table import Table
+from stimuli.errors import InputError
+from stimuli.table import Table, refuse_doubles
+
+#: Letters of a text that a participant can write.
+LONGEST_TEXT = 2000
 
 
 @dataclass(frozen=True)
@@ -21,3 +27,221 @@ def read_participants(table: Table) -> Participants:
     )
     table.end()
     return participants
+
+
+@dataclass(frozen=True)
+class Trap:
+    """A pair with an obvious answer: `better` against `worse` within a cell."""
+
+    cell: str
+    better: str
+    worse: str
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How many questions of each further kind a participant is asked (see
+    `analysis.manifest.KINDS`).
+    """
+
+    practice: int = 0
+    repeats: int = 0
+    swapped: int = 0
+    bias: int = 0
+    traps: tuple[Trap, ...] = ()
+
+    @property
+    def questions(self) -> int:
+        return self.practice + self.repeats + self.swapped + self.bias + len(self.traps)
+
+    def expected(self, kind: str, cell: str, left: str, right: str) -> int | None:
+        """The sign of the answer that is expected of a trial: -1 left, 1 right, 0 neither; None
+        where none is.
+        """
+        if kind == "bias":
+            return 0
+        if kind == "trap":
+            for trap in self.traps:
+                if trap.cell == cell and {trap.better, trap.worse} == {left, right}:
+                    return -1 if trap.better == left else 1
+        return None
+
+    def record(self, levels: dict[str, dict[str, str]]) -> dict:
+        """As a study's table; levels: of each cell, by its name."""
+        counts = {k: v for k, v in vars(self).items() if k != "traps"}
+        traps = [
+            {**levels[one.cell], "better": one.better, "worse": one.worse} for one in self.traps
+        ]
+        return {**counts, "traps": traps}
+
+
+def read_quality(
+    table: Table,
+    cells: dict[str, dict[str, str]],
+    techniques: Sequence[str],
+) -> Quality:
+    """The table `[quality]` of a study, checked. cells: the levels of each cell, by its name."""
+    counts = {
+        name: table.number(name, 0, 1000, default=0)
+        for name in ("practice", "repeats", "swapped", "bias")
+    }
+    pairs = len(cells) * len(techniques) * (len(techniques) - 1) // 2
+    if counts["repeats"] + counts["swapped"] > pairs // 2:
+        raise InputError(
+            f"{table.source}: {table.key}: repeats and swapped are "
+            f"{counts['repeats'] + counts['swapped']} together, expected at most {pairs // 2}: "
+            "half of the study's pairs, since what is asked again was asked in the first half"
+        )
+    if counts["practice"] > pairs:
+        raise table.fault("practice", counts["practice"], f"at most {pairs}, the study's pairs")
+    traps = []
+    table.take("traps", list, "a list of tables", default=[])
+    for entry in table.tables("traps", least=0) if "traps" in table.value else []:
+        better, worse = entry.one_of("better", techniques), entry.one_of("worse", techniques)
+        if better == worse:
+            raise entry.fault("worse", worse, "another technique than better")
+        given = {}
+        for factor in next(iter(cells.values())):
+            known = list(dict.fromkeys(levels[factor] for levels in cells.values()))
+            only = {"default": known[0]} if len(known) == 1 else {}
+            given[factor] = entry.one_of(factor, known, **only)
+        entry.end()
+        cell = next((name for name, levels in cells.items() if levels == given), None)
+        if cell is None:
+            raise InputError(f"{entry.source}: {entry.key}: {given} is no cell of the study")
+        trap = Trap(cell, better, worse)
+        if any({*vars(one).values()} == {*vars(trap).values()} for one in traps):
+            raise InputError(f"{entry.source}: {entry.key}: the same pair a second time")
+        traps.append(trap)
+    table.end()
+    return Quality(traps=tuple(traps), **counts)
+
+
+@dataclass(frozen=True)
+class Ask:
+    """A question of the study's own, before or after the pairs; its answer is a column `name`.
+
+    kind        "choice" of one of `options`, "scale" of as many points as there are options, whose
+                ends at least have words, "text" that is written
+    required    whether it must be answered; what is left out is an empty cell
+    """
+
+    name: str
+    kind: str
+    text: str
+    options: tuple[str, ...] = ()
+    required: bool = True
+
+    def value(self, given: str) -> str | None:
+        """What is stored of a form's field: the option's number from 1, or the text; "" where
+        nothing was answered, None where it cannot stand.
+        """
+        given = given.strip()
+        if not given:
+            return None if self.required else ""
+        if self.kind == "text":
+            return given[:LONGEST_TEXT]
+        known = [str(place) for place in range(1, len(self.options) + 1)]
+        return given if given in known else None
+
+    def record(self) -> dict:
+        return {**vars(self), "options": list(self.options)}
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What is asked about a choice, if anything: words to tick and a free text, both optional.
+
+    share: of the questions, drawn by participant and question
+    """
+
+    share: float = 0.0
+    text: str = "Why?"
+    ticks: tuple[str, ...] = ()
+    free: bool = True
+
+    def asked(self, seed: str, order: int) -> bool:
+        """Whether the question at a place of a participant's order (`seed` names both) asks it."""
+        drawn = int.from_bytes(hashlib.sha256(f"reason/{seed}/{order}".encode()).digest()[:8])
+        return drawn < self.share * 2**64
+
+    def record(self) -> dict:
+        return {**vars(self), "ticks": list(self.ticks)}
+
+
+@dataclass(frozen=True)
+class Pages:
+    """Texts of the study's own, paragraphs apart by empty lines; "" for none.
+
+    instructions    before the first question, on a page of their own
+    debrief         after the last one
+    break_every     so many questions are followed by a page that offers a rest; 0: none
+    """
+
+    instructions: str = ""
+    debrief: str = ""
+    break_every: int = 0
+
+
+def read_asks(tables: list[Table], taken: Sequence[str]) -> tuple[Ask, ...]:
+    """`[[before]]` or `[[after]]` of a study, checked. taken: names that other columns have."""
+    asks = []
+    for table in tables:
+        name, kind = table.name("name"), table.one_of("kind", ("choice", "scale", "text"))
+        if name in taken:
+            raise table.fault("name", name, "a name that no other column has")
+        options: tuple[str, ...] = ()
+        if kind != "text":
+            least = "a list of two texts or more"
+            if kind == "scale":
+                least += ", one a point; those between the ends may be empty"
+            given = table.take("options", list, least, lambda v, k=kind: _labels(v, k == "scale"))
+            options = tuple(given)
+        required = table.take("required", bool, "true or false", default=True)
+        if kind == "text" and "options" in table.value:
+            table.take("options", list, "no options", lambda v: not v)
+        asks.append(Ask(name, kind, table.text("text"), options, required))
+        table.end()
+    refuse_doubles(tables, "name")
+    return tuple(asks)
+
+
+def _labels(value: list, blanks: bool) -> bool:
+    texts = len(value) >= 2 and all(isinstance(one, str) for one in value)
+    shown = [value[0], value[-1]] if texts and blanks else value
+    return texts and all(one.strip() for one in shown)
+
+
+def read_reason(table: Table) -> Reason:
+    """`[reason]` of a study, checked."""
+    share = table.take(
+        "share", (int, float), "a number from 0 to 1", lambda v: 0 <= v <= 1, default=0.0
+    )
+    ticks = table.take("ticks", list, "a list of texts", lambda v: _ticks(v), default=[])
+    reason = Reason(
+        float(share),
+        table.text("text", default=Reason.text),
+        tuple(ticks),
+        table.take("free", bool, "true or false", default=True),
+    )
+    table.end()
+    if reason.share and not (reason.ticks or reason.free):
+        raise table.fault("free", False, "true, where there are no ticks")
+    return reason
+
+
+def _ticks(value: list) -> bool:
+    return all(isinstance(one, str) and one.strip() for one in value) and len(value) <= 20
+
+
+def read_pages(table: Table) -> Pages:
+    """`[pages]` of a study, checked."""
+    pages = Pages(
+        table.text("instructions", default="") if table.value.get("instructions") else "",
+        table.text("debrief", default="") if table.value.get("debrief") else "",
+        table.number("break_every", 0, 1000, default=0),
+    )
+    for key in ("instructions", "debrief"):
+        table.take(key, str, default="")
+    table.end()
+    return pages

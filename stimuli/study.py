@@ -16,7 +16,18 @@ from pathlib import Path
 
 from analysis.declared import options
 from analysis.manifest import WHOLE, read_region, read_self_rating
-from stimuli.asking import Participants, read_participants
+from stimuli.asking import (
+    Ask,
+    Pages,
+    Participants,
+    Quality,
+    Reason,
+    read_asks,
+    read_pages,
+    read_participants,
+    read_quality,
+    read_reason,
+)
 from stimuli.errors import InputError
 from stimuli.parts import read_toml
 from stimuli.scenes import load_table, merge
@@ -60,6 +71,10 @@ RESERVED = frozenset(
         "rt_server_ms",
         "rt_reported_ms",
         "rt_flag",
+        "kind",
+        "expected",
+        "reason_ticks",
+        "reason_text",
     }
 )
 #: What a consent text may say in braces; the page fills it in from what is asked and stored.
@@ -191,6 +206,11 @@ class Study:
     analysis: dict = field(default_factory=dict)
     viewer: Viewer = Viewer()
     participants: Participants = Participants()
+    quality: Quality = Quality()
+    before: tuple[Ask, ...] = ()
+    after: tuple[Ask, ...] = ()
+    reason: Reason = Reason()
+    pages: Pages = Pages()
 
     @property
     def framings(self) -> tuple[Level, ...]:
@@ -199,9 +219,11 @@ class Study:
 
     @property
     def questions(self) -> int:
-        """How many a participant is asked: every pair of conditions once in each cell."""
+        """How many a participant is asked: every pair of conditions once in each cell, and those
+        that tell how well people look.
+        """
         count = len(self.techniques)
-        return len(self.cells) * count * (count - 1) // 2
+        return len(self.cells) * count * (count - 1) // 2 + self.quality.questions
 
     def factor(self, name: str) -> Factor:
         """A factor by its name; KeyError where the study has none such."""
@@ -258,6 +280,11 @@ class Study:
             "consent": self.consent,
             "viewer": self.viewer.record(),
             "participants": vars(self.participants),
+            "quality": self.quality.record({cell.name: cell.levels for cell in self.cells}),
+            "before": [ask.record() for ask in self.before],
+            "after": [ask.record() for ask in self.after],
+            "reason": self.reason.record(),
+            "pages": vars(self.pages),
             **({"analysis": self.analysis} if self.analysis else {}),
         }
 
@@ -315,13 +342,20 @@ def read_study(
     wording = Table({**default, **table.value}, table.source, table.key)
     techniques = table.tables("techniques", least=2)
     factors = _factors(table, rendered=render is not None)
+    cells = _cells(table, factors)
+    asks = []
+    for key in ("before", "after"):
+        table.take(key, list, "a list of tables", default=[])
+        entries = table.tables(key, least=0) if key in table.value else []
+        taken = [*RESERVED, *(factor.name for factor in factors), *(a.name for a in sum(asks, ()))]
+        asks.append(read_asks(entries, taken))
     study = Study(
         name=table.name("name"),
         title=table.text("title"),
         version=table.number("version", 1, 2**31 - 1),
         seed=table.number("seed", 0, 2**63 - 1),
         factors=factors,
-        cells=_cells(table, factors),
+        cells=cells,
         techniques=tuple(_condition(t, rendered=render is not None) for t in techniques),
         question=_question(wording.table("question")),
         scale=_scale(wording),
@@ -331,7 +365,16 @@ def read_study(
         scene=scene,
         analysis=_analysis(table),
         viewer=read_viewer(table.table("viewer", default={}), display),
+        before=asks[0],
+        after=asks[1],
+        reason=read_reason(table.table("reason", default={})),
+        pages=read_pages(table.table("pages", default={})),
         participants=read_participants(table.table("participants", default={})),
+        quality=read_quality(
+            table.table("quality", default={}),
+            {cell.name: cell.levels for cell in cells},
+            [table.value["name"] for table in techniques],
+        ),
     )
     refuse_doubles(techniques, "name")
     refuse_doubles(techniques, "label")
@@ -457,9 +500,15 @@ def _question(table: Table) -> Question:
 
 
 def _scale(table: Table) -> tuple[ScalePoint, ...]:
-    levels = table.tables("scale", least=5, most=5)
-    for expected, level in zip(range(-2, 3), levels):
-        level.number("value", expected, expected)
+    levels = table.tables("scale", least=2, most=5)
+    values = [level.number("value", -2, 2) for level in levels]
+    if values != sorted({*values}) or values != [-value for value in reversed(values)]:
+        raise table.fault(
+            "scale",
+            values,
+            "values that ascend and are the same on both sides, such as -1, 1 for two alternatives "
+            "or -2, -1, 0, 1, 2",
+        )
     scale = tuple(ScalePoint(level.value["value"], level.text("label")) for level in levels)
     refuse_doubles(levels, "label")
     for level in levels:

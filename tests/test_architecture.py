@@ -26,6 +26,7 @@ MAY_IMPORT = {
         "stimuli.manifest",
         "stimuli.study",
         "stimuli.viewing",
+        "stimuli.asking",
     },
 }
 PROFILE_VERBS = {

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import func, select
+from sqlalchemy import Select, func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -116,7 +116,7 @@ def numbers(db: Session, study: Study) -> dict[str, Any]:
 def responses(db: Session, study: Study) -> Responses | None:
     """The answers that count, as the analysis takes them; None where there are none."""
     records = export.judgements(db, study)
-    if not records:
+    if not any(one["kind"] == "main" for one in records):
         return None
     from analysis.codebook import of_study
     from analysis.responses import responses_from_records
@@ -256,17 +256,20 @@ def about_other_images(db: Session, study: Study) -> int:
     )
 
 
+def _main(*columns: Any) -> Select:
+    """`export.counted` of the questions that the study is about."""
+    return export.counted(*columns).where(Trial.kind == "main")
+
+
 def sides(db: Session, study: Study) -> dict[str, Any]:
     """Whether it was really randomised: how often each technique stood on each side, and which side
     was preferred.
     """
     shown = {name: {"left": 0, "right": 0} for name in study.techniques}
     for side, column in (("left", Trial.left), ("right", Trial.right)):
-        for name, count in db.execute(export.counted(column, func.count()).group_by(column)):
+        for name, count in db.execute(_main(column, func.count()).group_by(column)):
             shown[name][side] = count
-    given = dict(
-        db.execute(export.counted(Response.answer, func.count()).group_by(Response.answer)).all()
-    )
+    given = dict(db.execute(_main(Response.answer, func.count()).group_by(Response.answer)).all())
     return {
         "shown": [
             {"label": condition.label, "name": condition.name, **shown[condition.name]}

@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session, undefer
 from app import recruiting
 from app.assignment import assign
 from app.database import Database
-from app.models import Event, Participant, Response, Trial, now, plain_code
+from app.models import Event, Participant, Response, Statement, Trial, now, plain_code
 from app.recruiting import Door
 from app.study import Study
 
@@ -63,6 +63,8 @@ class Answer:
     pixel_scale: float | None = None
     pixel_scale_largest: float | None = None
     seen_share: float | None = None
+    reason_ticks: str | None = None
+    reason_text: str | None = None
 
 
 def find(session: Session, visit: str | None, *, lock: bool = False) -> Participant | None:
@@ -81,6 +83,7 @@ _FIND = (
     .options(
         undefer(Participant.answered),
         undefer(Participant.questions),
+        undefer(Participant.stated),
         undefer(Participant.study_state),
     )
 )
@@ -114,6 +117,18 @@ def rate(session: Session, participant: Participant, familiarity: int) -> None:
         _note(session, participant, "rated")
 
 
+def state(session: Session, participant: Participant, values: dict[str, str]) -> None:
+    """Append answers to questions of the study's own, by their names; the first ones stay."""
+    known = {one.name for one in participant.statements}
+    if participant.withdrawn_at is None:
+        for name, value in values.items():
+            if name not in known:
+                one = Statement(participant_id=participant.id, name=name, value=value)
+                session.add(one)
+        session.flush()
+        session.expire(participant)
+
+
 def upcoming(session: Session, participant: Participant, count: int) -> list[Row]:
     """The next trials (id, order, cell, left, right), at most `count`: the current one first, then
     those whose images are worth fetching beforehand. Empty when all are answered.
@@ -127,7 +142,7 @@ def upcoming(session: Session, participant: Participant, count: int) -> list[Row
 
 
 _UPCOMING = (
-    select(Trial.id, Trial.order, Trial.cell, Trial.left, Trial.right)
+    select(Trial.id, Trial.order, Trial.cell, Trial.left, Trial.right, Trial.kind)
     .where(Trial.participant_id == bindparam("participant"))
     .where(Trial.order.between(bindparam("first"), bindparam("last")))
     .order_by(Trial.order)
@@ -142,6 +157,7 @@ class Standing:
     withdrawn_at: datetime | None
     answered: int
     questions: int
+    stated: int
     study_state: str
 
 
@@ -217,6 +233,7 @@ def _answer(
         asked.withdrawn_at,
         asked.answered,
         asked.questions,
+        asked.stated,
         asked.study_state,
     )
     if asked.order is None or asked.withdrawn_at or asked.study_state == "closed":
@@ -278,6 +295,7 @@ _ASKED = (
         Participant.consented_at,
         Participant.answered.expression.label("answered"),
         Participant.questions.expression.label("questions"),
+        Participant.stated.expression.label("stated"),
         Participant.study_state.expression.label("study_state"),
         Trial.order,
         Trial.cell,
@@ -293,16 +311,19 @@ _APPEND = insert(Response.__table__)
 _RECORDED = tuple(name for name in Answer.__dataclass_fields__ if name not in ("value", "rt_ms"))
 
 
-def complete(session: Session, participant: Participant) -> bool:
+def complete(session: Session, study: Study, participant: Participant) -> bool:
     """Give the completion code and the withdrawal key once as many answers are committed as there
-    are trials; whether they are given.
+    are trials, and all of the study's own questions are behind; whether they are given.
 
     Call it in a transaction of its own, after the one of the last answer: what it counts is on the
     disk.
     """
     if participant.completion_code:
         return True
-    if participant.answered != participant.questions or participant.withdrawn_at:
+    own = len(study.definition.before) + len(study.definition.after)
+    if participant.answered != participant.questions or participant.stated < own:
+        return False
+    if participant.withdrawn_at:
         return False
     participant.completion_code, participant.withdrawal_key = _secret(), _secret()
     participant.completed_at = now()

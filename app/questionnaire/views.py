@@ -29,6 +29,7 @@ from app.questionnaire.flow import Answer, Outcome, Standing
 from app.recruiting import Door
 from app.security import Limiter
 from app.web import database, simulated, study, wants_json
+from stimuli.asking import LONGEST_TEXT, Ask
 from stimuli.manifest import Image
 from stimuli.viewing import REQUIRED
 
@@ -152,6 +153,56 @@ def rate():
     return redirect(url_for(place), 303)
 
 
+@blueprint.get("/before")
+def before():
+    return _own(study().definition.before)
+
+
+@blueprint.post("/before")
+def state_before():
+    return _state("before", study().definition.before)
+
+
+@blueprint.get("/after")
+def after():
+    return _own(study().definition.after)
+
+
+@blueprint.post("/after")
+def state_after():
+    return _state("after", study().definition.after)
+
+
+def _own(asks: tuple[Ask, ...]):
+    """The page of questions of the study's own."""
+    with database().read() as db:
+        participant = _participant(db)
+        if redirection := _redirect_to_due(participant):
+            return redirection
+        return render_template(
+            "questionnaire/own.html",
+            asks=asks,
+            given=session.pop("given", {}),
+            upcoming=_of(flow.upcoming(db, participant, PRELOADED_QUESTIONS)),
+        )
+
+
+def _state(page: str, asks: tuple[Ask, ...]):
+    """Take the answers of that page, all of them or none."""
+    values = {ask.name: ask.value(request.form.get(ask.name, "")) for ask in asks}
+    if None in values.values():
+        flash("Please answer the questions that are not marked as optional.")
+        session["given"] = {ask.name: request.form.get(ask.name, "")[:200] for ask in asks}
+        return redirect(url_for(f".{page}"), 303)
+    with database().write() as db:
+        participant = _participant(db, lock=True)
+        if participant and _place(participant) == f"questionnaire.{page}":
+            flow.state(db, participant, values)
+            participant = _participant(db)
+        place = _place(participant)
+    return redirect(url_for(place), 303)
+
+
 @blueprint.get("/question")
 def question():
     with database().read() as db:
@@ -159,6 +210,16 @@ def question():
         if redirection := _redirect_to_due(participant):
             return redirection
         trial, *following = flow.upcoming(db, participant, 1 + PRELOADED_QUESTIONS)
+    if request.args.get("rested") == str(participant.answered):
+        session["rested"] = participant.answered
+    pages = study().definition.pages
+    if session.get("rested") != participant.answered and _pauses(participant.answered):
+        return render_template(
+            "questionnaire/pause.html",
+            participant=participant,
+            paragraphs=pages.instructions.split("\n\n") if not participant.answered else [],
+            upcoming=_of([trial, *following]),
+        )
     shown = flow.Shown.again(flow.Shown.of_cookie(session.get("shown")), trial)
     session["shown"] = shown.cookie()
     return render_template(
@@ -169,6 +230,7 @@ def question():
         images=_images(trial),
         upcoming=_of(following),
         measured=["view", *_MEASURED],
+        reason=study().definition.reason if _asks_reason(participant, trial.order) else None,
     )
 
 
@@ -177,16 +239,18 @@ def answer():
     trial, value = _integer("trial", 1, 2**63 - 1), _integer("answer", -2, 2)
     if trial is None:
         abort(400, "The form did not say which question it answers. Reload the page.")
-    if value is None:
+    if value not in (level.value for level in study().definition.scale):
         if wants_json():
-            abort(400, "The form held no answer from -2 to 2.")
-        flash("Please choose one of the five answers.")
+            abort(400, "The form held no answer of the study's scale.")
+        flash("Please choose one of the answers.")
         return redirect(url_for(".question"), 303)
     given = Answer(
         value=value,
         image_left_sha256=request.form.get("image_left", ""),
         image_right_sha256=request.form.get("image_right", ""),
         view=_view(),
+        reason_ticks=_ticks(),
+        reason_text=request.form.get("reason_text", "").strip()[:LONGEST_TEXT] or None,
         **{
             name: (_integer if kind is int else _number)(name, low, high)
             for name, (kind, low, high) in _MEASURED.items()
@@ -206,7 +270,7 @@ def answer():
     if here.answered == here.questions:
         # the answers are on the disk: now the committed ones can be counted
         with database().write() as db:
-            flow.complete(db, _participant(db, lock=True))
+            flow.complete(db, study(), _participant(db, lock=True))
     place = _place(here)
     kept = outcome in (Outcome.RECORDED, Outcome.REPEATED)
     if wants_json():
@@ -227,8 +291,9 @@ def thanks():
     if participant.completion_code is None:
         # the server stopped between the last answer and the count
         with database().write() as db:
-            participant = _participant(db, lock=True)
-            flow.complete(db, participant)
+            flow.complete(db, study(), _participant(db, lock=True))
+        with database().read() as db:
+            participant = _participant(db)
     return render_template("questionnaire/thanks.html", participant=participant)
 
 
@@ -307,7 +372,9 @@ def another():
 
 
 #: Pages of somebody who has begun and has not finished.
-_UNFINISHED = ("questionnaire.familiarity", "questionnaire.question")
+_UNFINISHED = tuple(
+    f"questionnaire.{page}" for page in ("familiarity", "before", "question", "after")
+)
 
 
 def _participant(db: Session, *, lock: bool = False) -> Participant | None:
@@ -320,12 +387,18 @@ def _place(here: Participant | Standing | None) -> str:
         return "questionnaire.welcome"
     if here.withdrawn_at:
         return "questionnaire.withdrawn"
+    asked = study().definition
     unfinished = here.answered < here.questions
     if unfinished and here.study_state == "closed":
         return "questionnaire.closed"
     if here.familiarity is None:
         return "questionnaire.familiarity"
-    return "questionnaire.question" if unfinished else "questionnaire.thanks"
+    if here.stated < len(asked.before):
+        return "questionnaire.before"
+    if unfinished:
+        return "questionnaire.question"
+    own = len(asked.before) + len(asked.after)
+    return "questionnaire.after" if here.stated < own else "questionnaire.thanks"
 
 
 def _redirect_to_due(participant: Participant | None):
@@ -343,6 +416,25 @@ def _of(trials: list[Row]) -> list[Image]:
 def _images(trial: Row) -> list[Image]:
     """The left and right image of a trial."""
     return [study().image(trial.cell, side) for side in (trial.left, trial.right)]
+
+
+def _ticks() -> str | None:
+    """The numbers of the words that were ticked for a reason, from 1."""
+    count = len(study().definition.reason.ticks)
+    ticked = [str(k) for k in range(1, count + 1) if request.form.get(f"reason_{k}") == "yes"]
+    return ";".join(ticked) or None
+
+
+def _asks_reason(participant: Participant, order: int) -> bool:
+    return study().definition.reason.asked(f"{study().seed}/{participant.id}", order)
+
+
+def _pauses(answered: int) -> bool:
+    """Whether a page stands before the next question: instructions, or a rest."""
+    pages = study().definition.pages
+    if not answered:
+        return bool(pages.instructions)
+    return bool(pages.break_every) and answered % pages.break_every == 0
 
 
 def _view() -> str | None:

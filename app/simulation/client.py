@@ -115,15 +115,42 @@ class Visitor:
                 page = self._send(
                     http, page, "familiarity", familiarity=self._crowd.familiarity(number)
                 )
+            page = self._between(http, page, number)
             order = self._answered(number)
             while form := _find(page, "trial"):
                 order += 1
                 cell, left, right = self._seen(form)
                 answer, rt_ms = self._crowd.answer(number, order, cell, left, right)
+                values = [level.value for level in self._study.definition.scale]
+                # of a scale without it, 'no difference' goes to either side
+                answer = min(values, key=lambda v: (abs(v - answer), (v < 0) == (rt_ms % 2 == 0)))
                 page = self._send(http, page, "trial", answer=answer, rt_ms=rt_ms, **WINDOW)
+                page = self._between(http, page, number)
                 yield order
             if 'id="completion-code"' not in page.text:
                 raise RuntimeError(f"participant {number} got no completion code at {page.url}")
+
+    def _between(self, http: httpx.Client, page: httpx.Response, number: int) -> httpx.Response:
+        """Answer the study's own questions and go on from instructions and rests."""
+        asks = {
+            ask.name: ask for ask in (*self._study.definition.before, *self._study.definition.after)
+        }
+        while True:
+            if form := _find(page, "rested"):
+                page = self._get(http, f"question?rested={form.fields['rested']}")
+            elif form := _find(page, "stated"):
+                filled = {
+                    name: self._crowd.statement(number, asks[name])
+                    for name in form.fields
+                    if name in asks
+                } | {
+                    name: self._crowd.statement(number, ask)
+                    for name, ask in asks.items()
+                    if ask.kind == "text" and f'name="{name}"' in page.text
+                }
+                page = self._send(http, page, "stated", **filled)
+            else:
+                return page
 
     def _answered(self, number: int) -> int:
         return next(

@@ -16,6 +16,7 @@ from random import Random
 
 from analysis.planning.answering import Answering
 from app.study import Study
+from stimuli.asking import Ask
 from stimuli.study import Cell
 
 #: Published priorities (Vuletic, tables 5.2 to 5.4).
@@ -79,6 +80,14 @@ class Crowd:
         five = len(self._levels) == len(FAMILIARITY_SHARES)
         draw = self._random(participant, "familiarity")
         return draw.choices(self._levels, FAMILIARITY_SHARES if five else None)[0]
+
+    def statement(self, participant: int, ask: Ask) -> str:
+        """The answer to a question of the study's own: any option, or a text that says what it
+        is.
+        """
+        if not ask.options:
+            return "simulated"
+        return str(self._random(participant, "own", ask.name).randint(1, len(ask.options)))
 
     def answer(
         self, participant: int, order: int, cell: str, left: str, right: str

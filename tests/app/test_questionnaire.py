@@ -259,7 +259,7 @@ def test_an_answer_outside_the_scale_is_not_taken(person, answer):
         == 400
     )
     somebody.send("trial", answer=answer)
-    assert somebody.answers == [] and "choose one of the five answers" in somebody.page.text
+    assert somebody.answers == [] and "choose one of the answers" in somebody.page.text
 
 
 def test_consent_clicked_twice_is_one_participant(app, person):

@@ -17,6 +17,8 @@ TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_g
 POSTS = [
     "/",
     "/familiarity",
+    "/before",
+    "/after",
     "/question",
     "/withdraw",
     "/resume/",
@@ -49,6 +51,8 @@ CLOSED = [
 OPEN = [
     "/",
     "/familiarity",
+    "/before",
+    "/after",
     "/question",
     "/thanks",
     "/withdraw",

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, chisquare
 
+from stimuli.asking import Quality, Trap
 from stimuli.design import Trial, trials
 
 FRAMINGS = ("close-up", "head-shot", "half-length")
@@ -88,3 +89,39 @@ def test_orders_are_uniform_over_participants():
 def test_no_two_participants_share_a_list():
     lists = {tuple(trials(FRAMINGS, TECHNIQUES, 9, participant)) for participant in range(500)}
     assert len(lists) == 500
+
+
+def test_what_tells_how_well_people_look_leaves_the_order_of_the_others():
+    traps = (Trap("near", "a", "d"), Trap("far", "b", "c"))
+    quality = Quality(practice=2, repeats=3, swapped=2, bias=2, traps=traps)
+    cells, items = ("near", "far"), ("a", "b", "c", "d")
+    for participant in range(1, 30):
+        plain = trials(cells, items, 5, participant)
+        found = trials(cells, items, 5, participant, quality)
+        assert [t.order for t in found] == list(range(1, 12 + quality.questions + 1))
+        assert Counter(t.kind for t in found) == {
+            "main": 12,
+            "practice": 2,
+            "repeat": 3,
+            "swapped": 2,
+            "bias": 2,
+            "trap": 2,
+        }
+        main = [t for t in found if t.kind == "main"]
+        strip = lambda some: [(t.cell, t.left, t.right) for t in some]
+        assert strip(main) == strip(plain)
+        assert {t.kind for t in found[:2]} == {"practice"}
+        for trial in found:
+            if trial.kind in ("repeat", "swapped"):
+                sides = (trial.left, trial.right)[:: 1 if trial.kind == "repeat" else -1]
+                (first,) = (t for t in main if (t.cell, t.left, t.right) == (trial.cell, *sides))
+                assert first.order < trial.order and main.index(first) < 6
+            if trial.kind == "bias":
+                assert trial.left == trial.right
+            if trial.kind == "trap":
+                sign = quality.expected("trap", trial.cell, trial.left, trial.right)
+                better = trial.left if sign == -1 else trial.right
+                assert better == {"near": "a", "far": "b"}[trial.cell]
+    drawn = [t for p in range(200) for t in trials(cells, items, 5, p, quality)]
+    lefts = Counter(t.left for t in drawn if t.kind == "trap" and t.cell == "near")
+    assert 70 < lefts["a"] < 130  # either side

@@ -242,13 +242,13 @@ def test_consent_knows_its_placeholders(write_toml):
             '[question]\ntext = "?"\nleft_label = "A"\n[render]',
             r"question\.right_label: missing",
         ),
-        ("[render]", "scale = 5\n[render]", r"scale: got 5, expected a list of 5 tables"),
+        ("[render]", "scale = 5\n[render]", r"scale: got 5, expected a list of 2 to 5 tables"),
         (
             "[render]",
             "scale = ["
             + ", ".join(f'{{value = {v}, label = "{v}"}}' for v in (-2, -1, 0, 2, 1))
             + "]\n[render]",
-            r"scale\[3\]\.value: got 2, expected 1",
+            r"scale: got \[-2, -1, 0, 2, 1\], expected values that ascend",
         ),
         (
             "[render]",
