@@ -1,19 +1,21 @@
 """Which files shape an image: what is rendered anew when one of them changes.
 
 Python modules are followed by their imports; shaders that techniques share are all of
-renderer/passes and renderer/shaders, and a technique's own are those beside its module. So a
-comment in the study code, or in another technique, leaves an image as it is.
+renderer/passes and renderer/shaders, and a technique's own are those beside its module and those
+that it names. So a comment in the study code, or in another technique, leaves an image as it is.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
+import re
 from functools import lru_cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 SHADERS = ("*.glsl", "*.vert", "*.frag", "*.geom")
+NAMED = re.compile(r"techniques/(\w+)")
 #: Where following starts for every image.
 SHARED = ("renderer.frame", "stimuli.scenes.staging")
 
@@ -64,11 +66,21 @@ def shared() -> set[Path]:
 
 
 def of_technique(module: str) -> set[Path]:
-    """The files of a technique's module: what it imports, and the shaders named as its modules."""
-    files = modules(module)
-    beside = {path.stem for path in files if path.parent == ROOT / "renderer/techniques"}
-    folder = ROOT / "renderer/techniques"
-    return files | {p for pattern in SHADERS for p in folder.glob(pattern) if p.stem in beside}
+    """The files of a technique's module: what it imports, the shaders that are named as its modules
+    and those that a module or a shader of these names.
+    """
+    files, folder = modules(module), ROOT / "renderer/techniques"
+    shaders = {path for pattern in SHADERS for path in folder.glob(pattern)}
+    waiting = list(files)
+    while waiting:
+        path = waiting.pop()
+        names = set(NAMED.findall(path.read_text(encoding="utf-8")))
+        if path.parent == folder:
+            names.add(path.stem)
+        new = {shader for shader in shaders - files if shader.stem in names}
+        files |= new
+        waiting += new
+    return files
 
 
 def digest(module: str) -> str:
