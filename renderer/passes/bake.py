@@ -72,16 +72,15 @@ def frames(normals: np.ndarray, spin: np.ndarray) -> np.ndarray:
 
 def _intersector(mesh: trimesh.Trimesh):
     """Embree where it is installed, trimesh's own (slow, kept) tracer elsewhere; said once."""
-    try:
+    if trimesh.ray.has_embree:
         return trimesh.ray.ray_pyembree.RayMeshIntersector(mesh)
-    except (ImportError, AttributeError, NameError):
-        import warnings
+    import warnings
 
-        warnings.warn(
-            "embreex is not installed here: baking light with trimesh's own, slower tracer",
-            stacklevel=2,
-        )
-        return trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
+    warnings.warn(
+        "embreex is not installed here: baking light with trimesh's own, slower tracer",
+        stacklevel=2,
+    )
+    return trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
 
 
 def _seen(light: Light, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

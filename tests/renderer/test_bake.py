@@ -1,6 +1,7 @@
 """Baked light against closed forms."""
 
 import numpy as np
+import pytest
 import trimesh
 
 from renderer.passes import bake as baking
@@ -88,3 +89,17 @@ def test_a_point_lamp_is_not_shaded_by_what_lies_behind_it():
         tracer = baking.Tracer(both.vertices, both.faces, [lamp], lambda d: 0 * d, 0)
         got = tracer.lamps(np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 1.0, 0.0]]))
         np.testing.assert_allclose(got, expected, rtol=1e-6)
+
+
+def test_without_embree_the_slower_tracer_gives_the_same_light_and_says_so(monkeypatch):
+    ball, plate = trimesh.creation.icosphere(1, 20.0), trimesh.creation.box((80.0, 80.0, 2.0))
+    ball.apply_translation((0.0, 0.0, 30.0))
+    mesh = trimesh.util.concatenate([ball, plate.subdivide()])
+    lamp = PointLight((1.0, 1.0, 1.0), position_mm=(60.0, 20.0, 120.0))
+    by_embree, _ = bake(mesh, [lamp], rays=24)
+    monkeypatch.setattr(trimesh.ray, "has_embree", False)  # as trimesh is where it found none
+    with pytest.warns(UserWarning, match="embreex is not installed"):
+        slower, _ = bake(mesh, [lamp], rays=24)
+    np.testing.assert_allclose(slower.openness, by_embree.openness, atol=0.02)
+    np.testing.assert_allclose(slower.light, by_embree.light, atol=0.05 * by_embree.light.max())
+    assert by_embree.openness.min() < 0.7
