@@ -12,9 +12,34 @@ import pytest
 import renderer
 
 ROOT = Path(__file__).resolve().parents[1]
-TABLE = """participant,familiarity,framing,left,right,answer,order,rt_ms,started_at
-P1,3,near,unreal,blender,1,1,900,2024-05-01T09:00:00Z
-P2,2,near,blender,unreal,-1,1,800,2024-05-01T09:00:00Z
+BALL = """
+subject = "ball"
+[objects.ball]
+shape = "sphere"
+radius_mm = 20.0
+[lights.sun]
+direction = [0.5, 0.5, 1.0]
+irradiance = [3.0, 3.0, 3.0]
+"""
+STUDY = """
+name = "balls"
+title = "Which ball?"
+version = 1
+seed = 1
+scene = "ball.toml"
+[render]
+size = [48, 27]
+supersample = 1
+[[framings]]
+name = "ball"
+label = "Ball"
+set = { camera = { framing = "ball", height_mm = 60.0, angle = "front" } }
+[[techniques]]
+name = "none"
+label = "None"
+[[techniques]]
+name = "golubev"
+label = "Golubev"
 """
 
 
@@ -53,23 +78,22 @@ def test_it_holds_what_is_needed_and_no_package_of_another_name(wheel):
         assert needed in names, needed
 
 
-def test_it_serves_and_analyses_away_from_the_checkout(wheel, tmp_path):
-    """Unpacked where no checkout is: help, a study's first page, a report, a scene."""
+def test_it_builds_serves_simulates_and_analyses_away_from_the_checkout(wheel, tmp_path):
+    """Unpacked where no checkout is: a scene, its images, a first page, answers, a report."""
     place = tmp_path / "installed"
     zipfile.ZipFile(wheel).extractall(place)
-    (tmp_path / "responses.csv").write_text(TABLE)
-    study = ROOT / "tests/app/first_edition"
-    (tmp_path / "study").mkdir()
-    for path in study.iterdir():
-        if path.suffix in (".png", ".json"):
-            (tmp_path / "study" / path.name).write_bytes(path.read_bytes())
+    (tmp_path / "ball.toml").write_text(BALL)
+    (tmp_path / "study.toml").write_text(STUDY)
     program = """
 import app, sys
 assert "installed" in app.__file__, app.__file__
-page = app.create_app("study").test_client().get("/")
-assert page.status_code == 200 and b"Which engine?" in page.data
 from app.cli import main
-assert main(["analyse", "responses.csv", "--out", "report"]) == 0
+assert main(["build", "study.toml", "--out", "study"]) == 0
+page = app.create_app("study").test_client().get("/")
+assert page.status_code == 200 and b"Which ball?" in page.data
+assert main(["simulate", "study", "--participants", "2", "--seed", "1"]) == 0
+answers = "study/simulated/responses.csv"
+assert main(["analyse", answers, "--study", "study", "--out", "report"]) == 0
 from stimuli import scenes
 assert scenes.read_scene(scenes.load_table("thesis")).lights
 """
