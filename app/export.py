@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import date, datetime
@@ -508,6 +509,38 @@ def completions_csv(session: Session) -> Iterator[str]:
             for one in found
         ),
     )
+
+
+def recruits_csv(session: Session, study: Study) -> Iterator[str]:
+    """recruits.csv: who came by a recruiter's link and how far they got, to pay or turn down; in
+    the order of the recruiter's names, so that it does not say who gave which answers.
+    """
+    names = study.definition.recruiting.parameters
+    found = session.scalars(
+        select(Participant)
+        .where(Participant.recruit_id.is_not(None))
+        .order_by(Participant.recruit_id)
+    )
+    rows = (
+        (
+            *(json.loads(one.recruit).get(name, "") for name in names),
+            one.completion_code or "",
+            int(one.completed_at is not None),
+            int(one.withdrawn_at is not None),
+            int(one.excluded_at is not None),
+        )
+        for one in found
+    )
+    header = (*names, "completion_code", "completed", "withdrawn", "excluded")
+    return _csv(header, (map(_harmless, row) for row in rows))
+
+
+def _harmless(value: Any) -> Any:
+    """What a stranger wrote, so that no spreadsheet takes it for a formula."""
+    return f"'{value}" if isinstance(value, str) and value[:1] in _FORMULA else value
+
+
+_FORMULA = frozenset("=+-@\t\r")
 
 
 def codebook_csv(study: Study) -> Iterator[str]:

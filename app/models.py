@@ -116,6 +116,8 @@ class Participant(Base):
     pilot: Mapped[bool] = mapped_column(default=False)  # tried the study out: does not count
     # JSON: what the recruiter's link said, where the study declares it
     recruit: Mapped[str | None] = mapped_column(String(2000))
+    # the first of it: who takes part once
+    recruit_id: Mapped[str | None] = mapped_column(String(100), index=True, unique=True)
     excluded_at: Mapped[datetime | None]
     excluded_because: Mapped[str | None] = mapped_column(String(500))
 

@@ -6,6 +6,7 @@ time of a reservation. Whether there is one, and taking it, is one transaction.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import timedelta
 from enum import Enum
 
@@ -13,7 +14,10 @@ from sqlalchemy import and_, func, or_, select
 from sqlalchemy.orm import Session
 
 from app.models import LogEntry, Participant, Response, StudyRecord, now
+from app.study import Study
 
+#: Of what a recruiter's link says, characters of each parameter.
+LONGEST = 100
 #: States of a study, with what they mean to participants.
 STATES = {
     "draft": "nobody can begin, but who is logged in to the dashboard",
@@ -32,6 +36,11 @@ class Door(Enum):
     PAUSED = "This study takes a pause. Please come back later."
     CLOSED = "This study has ended. Thank you for your interest."
     FULL = "All places of this study are taken. Thank you for your interest."
+    AGAIN = (
+        "You have begun this study already. Go on in the browser in which you began, or by the "
+        "code that it gave you."
+    )
+    STRANGER = "Please come by the link that you were given: it says who is to be paid."
 
 
 def record_of(session: Session, *, lock: bool = False) -> StudyRecord:
@@ -48,6 +57,22 @@ def door(session: Session, record: StudyRecord, *, insider: bool) -> Door:
         return Door[record.state.upper()]
     full = record.state == "open" and record.quota is not None
     return Door.FULL if full and places(session, record) >= record.quota else Door.OPEN
+
+
+def told(study: Study, link: Mapping[str, str]) -> dict[str, str]:
+    """What a recruiter's link says, of what the study declares; each at most `LONGEST` long."""
+    declared = study.definition.recruiting.parameters
+    return {name: link[name][:LONGEST] for name in declared if link.get(name)}
+
+
+def known(session: Session, study: Study, said: Mapping[str, str]) -> Door:
+    """Whether the recruiter's link lets somebody in."""
+    asked = study.definition.recruiting
+    if asked.required and asked.parameters[0] not in said:
+        return Door.STRANGER
+    who = said.get(asked.parameters[0]) if asked.parameters else None
+    query = select(Participant.id).where(Participant.recruit_id == who).limit(1)
+    return Door.AGAIN if who and session.scalar(query) else Door.OPEN
 
 
 def places(session: Session, record: StudyRecord) -> int:

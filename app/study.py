@@ -80,7 +80,11 @@ class Study:
 
     def content(self, *, images: bool) -> dict:
         """What participants see: the study's words and levels, and its images by their hashes."""
-        seen = {key: value for key, value in self.definition.record().items() if key != "analysis"}
+        seen = {
+            key: value
+            for key, value in self.definition.record().items()
+            if key not in ("analysis", "recruiting")
+        }
         if images:
             seen["images"] = {f"{i.cell} {i.technique}": i.sha256 for i in self.manifest.images}
         return json.loads(json.dumps(seen))
@@ -120,6 +124,8 @@ class Study:
             more += f", your answers to {own} other question{'s' if own > 1 else ''}"
         if asked.reason.share:
             more += ", the reasons that you give for a choice"
+        if names := ", ".join(asked.recruiting.parameters):
+            more += f", what your recruiter's link says of you ({names})"
         return RECORDED + more
 
     def database_url(self, simulated: bool) -> str:

@@ -30,6 +30,7 @@ from stimuli.asking import (
 )
 from stimuli.errors import InputError
 from stimuli.parts import read_toml
+from stimuli.recruiting import Recruiting, read_recruiting
 from stimuli.scenes import load_table, merge
 from stimuli.table import Table, refuse_doubles
 from stimuli.viewing import ONE_TO_ONE, Viewer, read_viewer
@@ -187,7 +188,8 @@ class Study:
 
     factors: framing first; cells: the combinations of their levels that are shown. `render` and
     `scene` (the table of the scene that levels patch) are None where the images are ready-made;
-    `analysis` is what it declares of its analysis; `viewer` is how pairs are looked at.
+    `analysis` is what it declares of its analysis; `viewer` is how pairs are looked at;
+    `recruiting` is what a recruiter's link says.
     """
 
     name: str
@@ -205,6 +207,7 @@ class Study:
     scene: dict | None = None
     analysis: dict = field(default_factory=dict)
     viewer: Viewer = Viewer()
+    recruiting: Recruiting = Recruiting()
     participants: Participants = Participants()
     quality: Quality = Quality()
     before: tuple[Ask, ...] = ()
@@ -279,6 +282,7 @@ class Study:
             },
             "consent": self.consent,
             "viewer": self.viewer.record(),
+            **({"recruiting": self.recruiting.record()} if self.recruiting != Recruiting() else {}),
             "participants": vars(self.participants),
             "quality": self.quality.record({cell.name: cell.levels for cell in self.cells}),
             "before": [ask.record() for ask in self.before],
@@ -369,6 +373,7 @@ def read_study(
         after=asks[1],
         reason=read_reason(table.table("reason", default={})),
         pages=read_pages(table.table("pages", default={})),
+        recruiting=read_recruiting(table.table("recruiting", default={})),
         participants=read_participants(table.table("participants", default={})),
         quality=read_quality(
             table.table("quality", default={}),

@@ -206,6 +206,14 @@ def _entries(db: Session, *which) -> list[LogEntry]:
     return list(db.scalars(select(LogEntry).where(*which).order_by(LogEntry.id.desc())))
 
 
+@blueprint.get("/recruits.csv")
+def recruits_csv():
+    """Who came by a recruiter's link, to pay; without a word of the answers."""
+    with database().read() as db:
+        body = "".join(export.recruits_csv(db, study()))
+    return _download(body, "recruits.csv")
+
+
 @blueprint.get("/pilot_responses.csv")
 def pilot_responses_csv():
     """The answers of who tried the study out, which are in no other table."""

@@ -7,10 +7,13 @@ ends.
 
 from __future__ import annotations
 
+import json
 import secrets
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from enum import Enum
+from types import MappingProxyType
 
 from sqlalchemy import Connection, Row, bindparam, insert, select
 from sqlalchemy.exc import IntegrityError
@@ -28,6 +31,9 @@ CODE_ALPHABET = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 CODE_LENGTH = 10
 #: So much longer than by the server's clock a browser's may say that an answer took.
 CLOCKS_APART_MS = 1000
+
+
+EMPTY: Mapping[str, str] = MappingProxyType({})
 
 
 class Outcome(Enum):
@@ -91,18 +97,30 @@ _FIND_AND_LOCK = _FIND.with_for_update()
 
 
 def enrol(
-    session: Session, study: Study, visit: str, *, insider: bool = False, recruit: str | None = None
+    session: Session,
+    study: Study,
+    visit: str,
+    *,
+    insider: bool = False,
+    said: Mapping[str, str] = EMPTY,
 ) -> Participant | Door:
     """The participant of a visit, with the trials assigned; consent given twice is one
     participant. The door where nobody can begin now.
+
+    said: what the recruiter's link said (`recruiting.told`).
     """
     record = recruiting.record_of(session, lock=True)  # before looking: two clicks are one person
     if participant := find(session, visit):
         return participant
     if (door := recruiting.door(session, record, insider=insider)) is not Door.OPEN:
         return door
+    if (door := recruiting.known(session, study, said)) is not Door.OPEN:
+        return door
     pilot = record.state in ("draft", "pilot")
-    participant = Participant(visit=visit, resume_code=_secret(), pilot=pilot, recruit=recruit)
+    participant = Participant(visit=visit, resume_code=_secret(), pilot=pilot)
+    if said:
+        participant.recruit = json.dumps(dict(said))
+        participant.recruit_id = said.get(study.definition.recruiting.parameters[0])
     session.add(participant)
     session.flush()  # gives the number
     session.add_all(assign(study, participant))

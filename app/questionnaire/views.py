@@ -5,6 +5,7 @@ Each shows what the database says is due, whatever address was asked for.
 
 from __future__ import annotations
 
+import json
 import secrets
 
 from flask import (
@@ -72,7 +73,11 @@ def welcome():
                     return render_template("questionnaire/simulated.html")
                 session["visit"] = secrets.token_urlsafe(16)
                 session.permanent = True
+            if said := recruiting.told(study(), request.args):
+                session["recruit"] = said
             door = recruiting.door(db, recruiting.record_of(db), insider=password.logged_in())
+            if door is Door.OPEN:
+                door = recruiting.known(db, study(), session.get("recruit", {}))
             if door is not Door.OPEN:
                 return _closed(door)
             return render_template(
@@ -107,7 +112,9 @@ def consent():
         )
     insider = password.logged_in()
     with database().write() as db:
-        participant = flow.enrol(db, study(), session["visit"], insider=insider)
+        participant = flow.enrol(
+            db, study(), session["visit"], insider=insider, said=session.get("recruit", {})
+        )
         if isinstance(participant, Door):
             return _closed(participant)
         place = _place(participant)
@@ -115,7 +122,16 @@ def consent():
 
 
 def _closed(door: Door):
-    return render_template("questionnaire/door.html", message=door.value), 403
+    asked = study().definition.recruiting
+    back = asked.back(asked.turned_away, session.get("recruit", {}))
+    return render_template("questionnaire/door.html", message=door.value, back=back), 403
+
+
+def _back(participant: Participant) -> str:
+    """Where the recruiter wants who has finished to go; '' for nowhere."""
+    asked = study().definition.recruiting
+    said = json.loads(participant.recruit or "{}")
+    return asked.back(asked.completed, said | {"code": participant.completion_code})
 
 
 @blueprint.get("/closed")
@@ -294,7 +310,9 @@ def thanks():
             flow.complete(db, study(), _participant(db, lock=True))
         with database().read() as db:
             participant = _participant(db)
-    return render_template("questionnaire/thanks.html", participant=participant)
+    return render_template(
+        "questionnaire/thanks.html", participant=participant, back=_back(participant)
+    )
 
 
 @blueprint.get("/withdraw")

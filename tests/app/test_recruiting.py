@@ -9,7 +9,8 @@ from datetime import timedelta
 import pytest
 from sqlalchemy import select
 
-from app import create_app, recruiting
+import stimuli.errors
+from app import create_app, export, recruiting
 from app.errors import InputError
 from app.models import Participant, Response, StudyRecord
 from app.questionnaire import flow
@@ -120,7 +121,8 @@ def test_answers_and_forms_of_a_closed_study_are_not_taken(app, person):
     assert (reply.status_code, reply.json) == (409, {"outcome": "stale", "next": "/closed"})
     assert somebody.answers == [] and newcomer.send("consent", consent="yes").status_code == 403
     somebody.get("/withdraw")  # that stays possible
-    somebody.http.post("/withdraw", data={"csrf_token": somebody.form("csrf_token")["csrf_token"]})
+    sent = {"csrf_token": somebody.form("csrf_token")["csrf_token"], "confirm": "yes"}
+    somebody.http.post("/withdraw", data=sent)
     somebody.get("/")
     assert somebody.path == "/withdrawn"
 
@@ -233,3 +235,84 @@ def test_who_is_too_fast_for_a_person_or_says_nonsense_is_flagged(app, person, e
     flags = {one["code"]: one["flags"] for one in people}
     assert "too_fast" in flags["P0001"] and "times_doubtful" not in flags["P0001"]
     assert flags["P0002"] == "times_doubtful"
+
+
+PROLIFIC = {
+    "panel": "prolific",
+    "required": True,
+    "completed": "https://panel.example/done?cc=X1&who={PROLIFIC_PID}&code={code}",
+    "turned_away": "https://panel.example/out?who={PROLIFIC_PID}",
+}
+
+
+@pytest.fixture
+def panel(tmp_path, write_study):
+    return create_app(write_study(tmp_path / "panel", recruiting=PROLIFIC))
+
+
+def test_a_recruiters_link_is_kept_and_leads_back(panel, person):
+    Person = type(person())
+    somebody = Person(panel)
+    somebody.get("/?PROLIFIC_PID=%3D1%2B1%26x&STUDY_ID=s&SESSION_ID=t&other=secret")
+    assert "PROLIFIC_PID" in somebody.page.text  # the consent says what is stored
+    somebody.begin().answer(*[0] * 30)
+    code = somebody.page.text.split('id="completion-code">')[1][:10]
+    back = f"https://panel.example/done?cc=X1&amp;who=%3D1%2B1%26x&amp;code={code}"
+    assert f'href="{back}"' in somebody.page.text
+    with panel.extensions["database"].read() as db:
+        [one] = db.scalars(select(Participant))
+        assert json.loads(one.recruit) == {
+            "PROLIFIC_PID": "=1+1&x",
+            "STUDY_ID": "s",
+            "SESSION_ID": "t",
+        }
+        listed = list(csv.DictReader(io.StringIO("".join(recruits(db, panel)))))
+        answers = "".join(export.responses_csv(db, panel.extensions["study"], simulated=False))
+    assert listed[0]["PROLIFIC_PID"] == "'=1+1&x" and listed[0]["completion_code"] == code
+    assert "1+1" not in answers  # who answered what stays apart from who is paid
+
+
+def recruits(db, app):
+    return export.recruits_csv(db, app.extensions["study"])
+
+
+def test_one_person_of_a_recruiter_takes_part_once(panel, person):
+    Person = type(person())
+    stranger, first, second = Person(panel), Person(panel), Person(panel)
+    assert "come by the link" in stranger.get("/").text
+    second.get("/?PROLIFIC_PID=a")
+    first.get("/?PROLIFIC_PID=a")
+    first.begin()
+    assert "begun this study already" in second.send("consent", consent="yes").text
+    assert second.page.status_code == 403
+    assert 'href="https://panel.example/out?who=a"' in second.page.text
+    assert "begun this study already" in Person(panel).get("/?PROLIFIC_PID=a").text
+    Person(panel).get("/?PROLIFIC_PID=" + "b" * 5000)
+    with panel.extensions["database"].read() as db:
+        assert len(db.scalars(select(Participant)).all()) == 1
+
+
+def test_a_study_that_declares_nothing_keeps_nothing_of_a_link(app, person):
+    somebody = person()
+    assert "recruiter" not in somebody.get("/?PROLIFIC_PID=a").text
+    somebody.begin()
+    with app.extensions["database"].read() as db:
+        assert db.get(Participant, 1).recruit is None
+
+
+@pytest.mark.parametrize(
+    "declared, says",
+    [
+        ({"panel": "other"}, "panel"),
+        ({"parameters": ["a b"]}, "parameters"),
+        ({"completed": "javascript:alert(1)"}, "an https address"),
+        ({"completed": "https://x.example/{nobody}"}, "an https address"),
+        ({"turned_away": "https://x.example/{code}"}, "there is none yet"),
+        ({"required": True}, "parameters that can be required"),
+    ],
+)
+def test_nonsense_about_recruiting_gets_one_line(tmp_path, write_study, declared, says):
+    study = write_study(tmp_path / "wrong", recruiting=declared)
+    with pytest.raises(stimuli.errors.InputError, match=says) as told:
+        create_app(study)
+    assert "\n" not in str(told.value)

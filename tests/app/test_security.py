@@ -40,6 +40,7 @@ CLOSED = [
         "participants.csv",
         "participants/P0001",
         "pilot_responses.csv",
+        "recruits.csv",
         "log.csv",
         "completions.csv",
         "codebook.csv",
