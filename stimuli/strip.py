@@ -5,6 +5,8 @@ for pixel.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
@@ -28,21 +30,24 @@ def parse_crop(text: str) -> tuple[int, int, int, int]:
     return x, y, width, height
 
 
-def strip(folder: str | Path, framing: str, crops: list[tuple[int, int, int, int]]) -> Image.Image:
-    """One column a condition in the study's order, one row a crop (the whole image without crops),
-    names above.
+def strip(
+    folder: str | Path, framings: Sequence[str], crops: list[tuple[int, int, int, int]]
+) -> Image.Image:
+    """One column a condition in the study's order, for each framing one row a crop (the whole image
+    without crops), names above.
     """
     manifest = load_manifest(Path(folder))
     names = [f.name for f in manifest.study.framings]
-    if framing not in names:
-        raise InputError(f"{folder}: no framing {framing!r}; expected one of {', '.join(names)}")
-    columns = []
-    for condition in manifest.study.techniques:
-        path = next(
-            i.path for i in manifest.images if (i.framing, i.technique) == (framing, condition.name)
-        )
-        columns.append((condition.label, Image.open(path).convert("RGB")))
-    width, height = columns[0][1].size
+    for framing in framings:
+        if framing not in names:
+            known = ", ".join(names)
+            raise InputError(f"{folder}: no framing {framing!r}; expected one of {known}")
+    paths = {(i.framing, i.technique): i.path for i in reversed(manifest.images)}
+    columns = [
+        (c.label, [Image.open(paths[framing, c.name]).convert("RGB") for framing in framings])
+        for c in manifest.study.techniques
+    ]
+    width, height = columns[0][1][0].size
     boxes = crops or [(0, 0, width, height)]
     for x, y, w, h in boxes:
         if x + w > width or y + h > height or w != boxes[0][2]:
@@ -55,17 +60,17 @@ def strip(folder: str | Path, framing: str, crops: list[tuple[int, int, int, int
         "RGB",
         (
             len(columns) * (column + GAP_PX) - GAP_PX,
-            BAND_PX + sum(h + GAP_PX for *_, h in boxes) - GAP_PX,
+            BAND_PX + len(framings) * sum(h + GAP_PX for *_, h in boxes) - GAP_PX,
         ),
         (24, 24, 26),
     )
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(20)
-    for k, (label, image) in enumerate(columns):
+    for k, (label, images) in enumerate(columns):
         left, top = k * (column + GAP_PX), BAND_PX
         draw.text(
             (left + column / 2, BAND_PX / 2), label, font=font, fill=(236, 236, 236), anchor="mm"
         )
-        for x, y, w, h in boxes:
+        for image, (x, y, w, h) in product(images, boxes):
             sheet.paste(image.crop((x, y, x + w, y + h)), (left, top))
             top += h + GAP_PX
     return sheet

@@ -10,9 +10,11 @@ import click
 @click.option(
     "--framing",
     "-f",
-    default="close-up",
+    "framings",
+    multiple=True,
+    default=["close-up"],
     show_default=True,
-    help="The framing to compare, by its name in the study.",
+    help="The framing to compare, by its name in the study; repeat for more rows.",
 )
 @click.option(
     "--crop",
@@ -28,13 +30,13 @@ import click
     type=click.Path(dir_okay=False, path_type=Path),
     help="The PNG file to write.",
 )
-def command(folder: Path, framing: str, crops: tuple[str, ...], out: Path) -> None:
+def command(folder: Path, framings: tuple[str, ...], crops: tuple[str, ...], out: Path) -> None:
     """Put every condition of the study in FOLDER side by side."""
     from stimuli.errors import InputError
     from stimuli.strip import parse_crop, strip
 
     if out.suffix.lower() != ".png" or not out.parent.is_dir():
         raise InputError(f"{out}: expected a file name that ends in .png in a folder that exists")
-    sheet = strip(folder, framing, [parse_crop(text) for text in crops])
+    sheet = strip(folder, framings, [parse_crop(text) for text in crops])
     sheet.save(out, optimize=True)
     click.echo(f"{out}: {sheet.width}x{sheet.height}")

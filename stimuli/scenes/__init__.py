@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from renderer.scene import Scene
     from renderer.scene.graph import SceneGraph
 
+MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 _FILES = (("environment", "map"),)
 MAP_ENDING = "_map"  # of a material's keys that name files
 
@@ -64,7 +65,8 @@ def merge(table: Mapping[str, Any], patch: Mapping[str, Any]) -> dict[str, Any]:
 def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
     """The table with its named parts put in: the rig's lights, the people's own skin.
 
-    An object that names no material has the one of its own name; a person's starts from their skin.
+    An object that names no material has the one of its own name; a person's starts from their skin,
+    that of a glTF file from the medium in it.
     """
     table = dict(table)
     rig = table.pop("rig", None)
@@ -82,6 +84,10 @@ def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
         if entry.get("shape") == "person":
             person = entry.get("person", "man")
             own = merge({"kind": "skin"}, person_table(person).get("skin", {}))
+        elif entry.get("shape") in ("mesh", "scan"):
+            given = materials.get(name, {})
+            if not isinstance(given, Mapping) or not {"medium", "kind"} & set(given):
+                own = _own_medium(entry)
         objects[name] = {**entry, "material": name}
         materials[name] = merge(own, materials.get(name, {}))
     return {**table, "objects": objects, "materials": materials}
@@ -92,6 +98,18 @@ def read_scene(table: Mapping[str, Any], where: str = "scene") -> Scene:
     from renderer.scene import Scene
 
     return Scene.read(complete(table, where), where)
+
+
+def _own_medium(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """What a glTF file says of the medium of its mesh: a table of a material, empty for others."""
+    file = Path(str(entry.get("file", "")))
+    unit = MM.get(entry.get("unit", "m" if entry["shape"] == "scan" else "mm"))
+    if file.suffix.lower() not in (".glb", ".gltf") or not file.is_file() or unit is None:
+        return {}  # what is wrong with it is said where it is read
+    from stimuli.heads.formats import Source, gltf
+
+    found = gltf.medium(Source(file), unit)
+    return {} if found is None else {"medium": found}
 
 
 def person_table(name_or_path: str) -> dict[str, Any]:

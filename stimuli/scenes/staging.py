@@ -21,9 +21,8 @@ from renderer.scene.graph import SceneGraph
 from renderer.scene.material import MAPS, Skin
 from stimuli.errors import InputError
 from stimuli.heads import load_person, load_scan
-from stimuli.scenes import Stage
+from stimuli.scenes import MM, Stage
 
-MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 GENERATED = {"what": "generated shape", "licence": "MIT", "source": "subdermal"}
 
 

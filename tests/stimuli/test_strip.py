@@ -15,7 +15,7 @@ def test_columns_are_the_conditions_pixel_for_pixel(ready_made):
     framing = manifest.study.framings[0].name
     width, height = manifest.images[0].width, manifest.images[0].height
     sheet = np.asarray(
-        strip(ready_made, framing, [(2, 1, width - 4, height - 3), (0, 0, width - 4, 4)])
+        strip(ready_made, [framing], [(2, 1, width - 4, height - 3), (0, 0, width - 4, 4)])
     )
     for k, condition in enumerate(manifest.study.techniques):
         image = next(
@@ -31,6 +31,14 @@ def test_columns_are_the_conditions_pixel_for_pixel(ready_made):
         np.testing.assert_array_equal(
             sheet[second : second + 4, left : left + width - 4], pixels[:4, : width - 4]
         )
+
+
+def test_framings_are_rows(ready_made):
+    name = load_manifest(ready_made).study.framings[0].name
+    one = np.asarray(strip(ready_made, [name], []))
+    two = np.asarray(strip(ready_made, [name, name], []))
+    np.testing.assert_array_equal(two[: len(one)], one)
+    np.testing.assert_array_equal(two[len(one) + GAP_PX :], one[BAND_PX:])
 
 
 @pytest.mark.parametrize("text", ["", "10", "10x10", "0x10+1+1", "axb+1+1", "10x10-1+1"])

@@ -93,6 +93,79 @@ def _glb(source: Source, data: bytes) -> tuple[dict, bytes]:
     return document, binary
 
 
+def medium(source: Source, unit_mm: float) -> dict | None:
+    """The medium that the file's materials name, as a table of renderer.optics.media, or None.
+
+    KHR_materials_volume has the extinction, sigma_t = -ln(attenuationColor) / attenuationDistance;
+    KHR_materials_volume_scatter the colour after multiple scattering, from which the single-
+    scattering albedo follows (Kulla and Conty 2017, "Revisiting physically based shading at
+    Imageworks", SIGGRAPH course), and g; KHR_materials_ior the index. unit_mm: of the file's unit.
+    """
+    data = source.content()
+    try:
+        glb = source.path.suffix.lower() == ".glb"
+        document = _glb(source, data)[0] if glb else json.loads(data)
+        found = [
+            _medium(source, str(material.get("name", k)), material.get("extensions", {}), unit_mm)
+            for k, material in enumerate(document.get("materials", []))
+            if "KHR_materials_volume_scatter" in material.get("extensions", {})
+        ]
+    except InputError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        reason = f"{type(error).__name__}: {error}".replace("\n", " ")
+        raise source.error(f"is not valid glTF ({reason}); expected a validator's glTF") from None
+    if any(other != found[0] for other in found):
+        raise source.error(
+            f"has {len(found)} materials that scatter differently; expected one medium, or a "
+            "medium in the scene"
+        )
+    return found[0] if found else None
+
+
+def _medium(source: Source, name: str, extensions: dict, unit_mm: float) -> dict:
+    """The medium of one material's extensions."""
+    volume, scatter = (
+        extensions.get(f"KHR_materials_{kind}", {}) for kind in ("volume", "volume_scatter")
+    )
+    distance = float(volume.get("attenuationDistance", np.inf))
+    colour = np.array(volume.get("attenuationColor", (1, 1, 1)), float)
+    many = np.array(scatter.get("multiscatterColor", (0, 0, 0)), float)
+    g, eta = (
+        float(scatter.get("scatterAnisotropy", 0)),
+        float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5)),
+    )
+    for what, values, good, expected in (
+        ("attenuationDistance", distance, 0 < distance < np.inf, "a distance above 0"),
+        (
+            "attenuationColor",
+            colour,
+            colour.shape == (3,) and ((colour > 0) & (colour < 1)).all(),
+            "three numbers between 0 and 1",
+        ),
+        (
+            "multiscatterColor",
+            many,
+            many.shape == (3,) and ((many >= 0) & (many < 1)).all(),
+            "three numbers from 0 to below 1",
+        ),
+        ("scatterAnisotropy", g, -1 < g < 1, "a number between -1 and 1"),
+    ):
+        if not good:
+            raise source.error(f"material {name!r}: {what} is {values}; expected {expected}")
+    sigma_t = -np.log(colour) / (distance * unit_mm)
+    s = 4.097125 + 4.20863 * many - np.sqrt(9.59217 + 41.6808 * many + 17.7126 * many**2)
+    s = np.clip(s, 0, 1)
+    albedo = (1 - s**2) / (1 - g * s**2)
+    return {
+        "sigma_a": tuple((sigma_t * (1 - albedo)).tolist()),
+        "sigma_s": tuple((sigma_t * albedo).tolist()),
+        "g": g,
+        "eta": eta,
+        "name": name,
+    }
+
+
 class _Document:
     """A glTF document and its buffers."""
 
