@@ -103,7 +103,9 @@ def init(app: Flask) -> None:
         MAX_CONTENT_LENGTH=64 * 1024,
     )
     app.session_interface = _Sessions()
-    app.before_request(_refuse_other_hosts)  # before anything else looks at the request
+    # before anything else looks at the request
+    app.before_request(_refuse_other_hosts)
+    app.before_request(_refuse_nul)
     CSRFProtect(app)
     app.after_request(_headers)
 
@@ -112,6 +114,12 @@ def _refuse_other_hosts() -> None:
     hosts = current_app.config["HOSTS"]  # Flask's TRUSTED_HOSTS leaves no page to say so
     if hosts and not host_is_trusted(request.host, hosts):
         abort(400, "This server is not asked under this name.")
+
+
+def _refuse_nul() -> None:
+    """PostgreSQL takes no NUL in a text, and no page of ours sends one."""
+    if any("\0" in value for value in (*request.args.values(), *request.form.values())):
+        abort(400, "A field held a character that is none.")
 
 
 def _headers(response: Response) -> Response:

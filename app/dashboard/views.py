@@ -159,7 +159,7 @@ def judge(code: str):
 
 def _someone(db: Session, code: str) -> Participant:
     number = code.removeprefix("P")
-    found = db.get(Participant, int(number)) if re.fullmatch(r"[0-9]{4,18}", number) else None
+    found = db.get(Participant, int(number)) if re.fullmatch(r"[0-9]{4,9}", number) else None
     if found is None or found.code != code:
         abort(404, "There is no such participant.")
     return found

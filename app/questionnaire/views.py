@@ -252,7 +252,7 @@ def question():
 
 @blueprint.post("/question")
 def answer():
-    trial, value = _integer("trial", 1, 2**63 - 1), _integer("answer", -2, 2)
+    trial, value = _integer("trial", 1, 2**31 - 1), _integer("answer", -2, 2)
     if trial is None:
         abort(400, "The form did not say which question it answers. Reload the page.")
     if value not in (level.value for level in study().definition.scale):

@@ -32,15 +32,17 @@ def written(app, person, tmp_path):
     return tmp_path / "study.zip"
 
 
-def test_everything_comes_back_and_goes_on(app, person, written, tmp_path):
-    archive.read(written, tmp_path / "elsewhere", None)
+@pytest.mark.parametrize("kind", ["sqlite", "the test's own"])
+def test_everything_comes_back_and_goes_on(app, person, written, tmp_path, kind):
+    """Over PostgreSQL, from one kind of database into the other and into its own."""
+    study = app.extensions["study"]
+    url = f"sqlite:///{tmp_path}/a.sqlite3" if kind == "sqlite" else study.database_url(True)
+    archive.read(written, tmp_path / "elsewhere", url)
     assert written.stat().st_mode & 0o777 == 0o600
-    again = create_app(tmp_path / "elsewhere")
+    again = create_app(tmp_path / "elsewhere", url)
     assert content(again) == content(app)
     for image in again.extensions["study"].manifest.images:
-        assert (
-            image.path.read_bytes() == (app.extensions["study"].directory / image.file).read_bytes()
-        )
+        assert image.path.read_bytes() == (study.directory / image.file).read_bytes()
     newcomer = type(person())(again).begin().answer(2)  # numbers go on
     assert newcomer.answers == [2]
     with again.extensions["database"].read() as db:
