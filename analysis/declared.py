@@ -2,10 +2,10 @@
 as `Options`.
 
     "analysis": {"margin": 0.25, "margin_jod": 0.5, "test": "wilcoxon", "exclusions":
-    {"median_rt_ms": 500, "zeta": false}}
+    {"median_rt_ms": 500, "zeta": false}, "posterior": {"prior_worth": 1.5}}
 
-Keys are the fields of `options.Options` and `options.Exclusions`; what is not declared has their
-defaults; a rule that is false is off.
+Keys are the fields of `options.Options`, `options.Exclusions` and `options.Sampling`; what is not
+declared has their defaults; a rule that is false is off.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ from dataclasses import fields, replace
 from difflib import get_close_matches
 
 from analysis.errors import InputError
-from analysis.options import Exclusions, Options
+from analysis.options import Exclusions, Options, Sampling
 
 #: Where margins and rules come from, when no study file declares any.
 UNDECLARED = "no margin or rule was declared in a study file: the defaults of subdermal"
 
 #: Choices that are numbers; a rule is a number or false.
 NUMBERS = ("margin", "margin_jod", "level")
+#: Choices that are tables of their own.
+TABLES = {"exclusions": Exclusions, "posterior": Sampling}
 
 
 def options(
@@ -34,36 +36,39 @@ def options(
     Raises InputError that names the key of `source` at fault, or the one that was given. This is
     the one check of `[analysis]`: studies, manifests and the command line all come here.
     """
-    rules = declared.get("exclusions", {})
-    if not isinstance(rules, Mapping):
-        raise InputError(f"{source}.exclusions is {rules!r:.60}, expected a table")
-    values = {key: value for key, value in declared.items() if key != "exclusions"}
+    for name, choices in TABLES.items():
+        if not isinstance(declared.get(name, {}), Mapping):
+            raise InputError(f"{source}.{name} is {declared[name]!r:.60}, expected a table")
+        _known(f"{source}.{name}", declared.get(name, {}), choices)
+    rules, sampling = (declared.get(name, {}) for name in TABLES)
+    values = {key: value for key, value in declared.items() if key not in TABLES}
     _known(source, values, Options)
-    _known(f"{source}.exclusions", rules, Exclusions)
     for key, value in {
         **values,
         **{f"exclusions.{key}": rule for key, rule in rules.items()},
+        **{f"posterior.{key}": value for key, value in sampling.items()},
     }.items():
-        rule = key.startswith("exclusions.")
-        if (rule or key in NUMBERS) and not (_is_number(value) or (rule and value is False)):
+        rule, number = key.startswith("exclusions."), key in NUMBERS or "." in key
+        if number and not (_is_number(value) or (rule and value is False)):
             expected = "a number or false" if rule else "a number"
             raise InputError(f"{source}.{key} is {value!r:.60}, expected {expected}")
     try:
         found = Options(
             **{key: tuple(v) if isinstance(v, list) else v for key, v in values.items()},
             exclusions=Exclusions(**{k: None if v is False else v for k, v in rules.items()}),
+            posterior=Sampling(**sampling),
         )
     except InputError as error:
         raise InputError(f"{source}.{error}") from None
     chosen = {name: value for name, value in given.items() if value is not None}
     kept = [name for name in values if chosen.get(name, values[name]) == values[name]]
-    named = (*kept, *(f"exclusions.{name}" for name in rules))
+    named = (*kept, *(f"{table}.{name}" for table in TABLES for name in declared.get(table, {})))
     return replace(found, **chosen, declared=named)
 
 
 def _known(source: str, table: Mapping[str, object], choices: type) -> None:
     """Refuse a key that `choices` does not have."""
-    names = [one.name for one in fields(choices) if one.name not in ("exclusions", "declared")]
+    names = [one.name for one in fields(choices) if one.name not in (*TABLES, "declared")]
     for key in table:
         if key not in names:
             near = get_close_matches(str(key), names, 1)

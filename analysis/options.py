@@ -4,7 +4,7 @@ declared test, the exclusions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from analysis.errors import InputError
 
@@ -49,6 +49,57 @@ class Exclusions:
 
 
 @dataclass(frozen=True)
+class Sampling:
+    """How `analysis.posterior` draws, and its priors.
+
+    chains, draws, warmup  so many chains of so many draws each, after so many steps of warm-up
+    target_acceptance      the share of steps that the sampler aims to accept, between 0 and 1:
+                           nearer to 1, smaller steps
+    prior_worth            spread of techniques' worths
+    prior_image            spread of what a technique gains in one image
+    prior_taste            spread of people's own tastes for a technique
+    prior_person_side      spread of people's leaning to a side
+    prior_side             the side effect: standard deviation of a normal prior about 0
+    prior_slight           the threshold of a slight preference
+    prior_clear            from that to the threshold of a clear one
+    Priors are scales in logits, above 0, of half-normal distributions but for prior_side's.
+    """
+
+    chains: int = 4
+    draws: int = 1000
+    warmup: int = 1000
+    target_acceptance: float = 0.95
+    prior_worth: float = 2.0
+    prior_image: float = 1.0
+    prior_taste: float = 1.0
+    prior_person_side: float = 1.0
+    prior_side: float = 1.0
+    prior_slight: float = 1.0
+    prior_clear: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name, least, most in (
+            ("chains", 2, 64),
+            ("draws", 100, 100_000),
+            ("warmup", 100, 100_000),
+        ):
+            _whole(f"posterior.{name}", getattr(self, name), least, most)
+        for one in fields(self):
+            value = getattr(self, one.name)
+            most = 1 if one.name == "target_acceptance" else 1000
+            if one.type == "float" and not 0 < value < most:
+                raise InputError(
+                    f"posterior.{one.name} is {value!r}, expected a number above 0 and below {most}"
+                )
+
+    @property
+    def priors(self) -> dict[str, float]:
+        """Name without 'prior_' -> scale, logits."""
+        names = (one.name for one in fields(self) if one.name.startswith("prior_"))
+        return {name.removeprefix("prior_"): getattr(self, name) for name in names}
+
+
+@dataclass(frozen=True)
 class Options:
     """The analyst's choices; each is recorded in the output.
 
@@ -67,6 +118,7 @@ class Options:
                 the ordinal model weak priors), or 'none'
     models      the models of worth to fit
     exclusions  see `Exclusions`
+    posterior   see `Sampling`
     declared    names of the choices that a study declared, rules as 'exclusions.NAME'; the others
                 are defaults or were given later
     """
@@ -82,13 +134,12 @@ class Options:
     fallback: str = "reduced_bias"
     models: tuple[str, ...] = ("bradley_terry", "davidson", "thurstone_jod", "ordinal")
     exclusions: Exclusions = field(default_factory=Exclusions)
+    posterior: Sampling = field(default_factory=Sampling)
     declared: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, least, most in (("resamples", 100, 1_000_000), ("seed", 0, 2**63 - 1)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-                raise InputError(f"{name} is {value!r}, expected an integer from {least} to {most}")
+            _whole(name, getattr(self, name), least, most)
         if not 0.5 < self.level < 1:
             raise InputError(
                 f"level is {self.level!r}, expected a number between 0.5 and 1, such as 0.95"
@@ -118,6 +169,11 @@ class Options:
                 f"models names the unknown {', '.join(unknown)}; expected some of "
                 f"{', '.join(models)}"
             )
+
+
+def _whole(name: str, value: object, least: int, most: int) -> None:
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+        raise InputError(f"{name} is {value!r}, expected an integer from {least} to {most}")
 
 
 def _within(name: str, value: float | None, low: float, high: float) -> None:

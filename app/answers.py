@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,22 @@ def names(
 ) -> tuple[str, ...] | None:
     """'a, b,c' as ('a', 'b', 'c')."""
     return None if value is None else tuple(name.strip() for name in value.split(","))
+
+
+def numbers(
+    ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> dict[str, float]:
+    """('a=0.3', 'b=-1') as {'a': 0.3, 'b': -1}."""
+    found = {}
+    for text in values:
+        name, _, number = text.partition("=")
+        try:
+            found[name.strip()] = float(number)
+        except ValueError:
+            raise click.BadParameter(
+                f"{text!r} is no {parameter.metavar}, such as golubev=0.4"
+            ) from None
+    return found
 
 
 study_option = click.option(
@@ -77,9 +94,21 @@ def tell(path: Path, answers: Responses) -> None:
         click.echo(f"{path}: {note}", err=True)
 
 
-def written(verb: str, *parts: tuple[str, ...]) -> str:
-    """The command as it is shown in its output: without folders, so that it says nothing of the
-    machine and never changes.
+def written() -> str:
+    """The command that runs as its output shows it: what was given, without folders and without
+    --out, so that it says nothing of the machine and never changes.
     """
-    words = [word for part in parts for word in part]
-    return shlex.join(["subdermal", verb, *words, "--out", "DIR"])
+    context = click.get_current_context()
+    words = ["subdermal", context.info_name]
+    for parameter in context.command.params:
+        source, value = context.get_parameter_source(parameter.name), context.params[parameter.name]
+        if source is not click.core.ParameterSource.COMMANDLINE or parameter.name == "out":
+            continue
+        if isinstance(value, Mapping):
+            value = tuple(f"{name}={one:g}" for name, one in value.items())
+        elif isinstance(value, tuple) and not parameter.multiple:
+            value = (",".join(value),)
+        for one in value if isinstance(value, tuple) else (value,):
+            words += [parameter.opts[0]] if isinstance(parameter, click.Option) else []
+            words.append(one.name if isinstance(one, Path) else f"{one}")
+    return shlex.join([*words, "--out", "DIR"])

@@ -1,5 +1,6 @@
 """The command line: every option explains itself, and bad input gives one line and exit code 2."""
 
+import os
 import subprocess
 import sys
 
@@ -62,6 +63,20 @@ def test_help_loads_nothing_heavy():
         "OpenGL",
         "trimesh",
     }
+
+
+def test_analyse_takes_one_thread_of_blas_unless_told_otherwise():
+    """Said before numpy is loaded, or it would not hold."""
+    program = (
+        "import os, sys, app.commands.analyse; "
+        "print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    for given, expected in (({}, "False 1"), ({"OPENBLAS_NUM_THREADS": "4"}, "False 4")):
+        rest = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+        run = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, env=rest | given
+        )
+        assert run.stdout.strip() == expected
 
 
 @pytest.mark.parametrize(

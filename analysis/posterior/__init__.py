@@ -1,6 +1,6 @@
 """A Bayesian multilevel model of the answers: its draws, tables, picture and page."""
 
-from analysis.posterior.model import Posterior, Sampling, sample
+from analysis.posterior.model import Posterior, sample
 from analysis.posterior.words import posterior_files
 
-__all__ = ["Posterior", "Sampling", "posterior_files", "sample"]
+__all__ = ["Posterior", "posterior_files", "sample"]

@@ -9,8 +9,8 @@ s a person's leaning to the right; v, u and s are normal with spreads of their o
 and images are crossed random effects (Clark 1973, doi:10.1016/S0022-5371(73)80014-3; Baayen,
 Davidson and Bates 2008, doi:10.1016/j.jml.2007.12.005). Answers are cumulative logits over
 thresholds symmetric about 0 (Agresti 1992, doi:10.2307/2347562), as in `analysis.worth.ordinal`.
-Priors, logits: w normal with a spread that is half-normal(2); the other spreads half-normal(1), the
-side normal(0, 1), the thresholds' steps half-normal(1) and (2).
+w, v, u and s have normal priors with spreads that are half-normal, as the thresholds' steps are;
+the side's is normal. Their scales are `analysis.options.Sampling`'s.
 
 The posterior is drawn by the No-U-Turn sampler of NumPyro (Phan, Pradhan and Jankowiak 2019,
 arXiv:1912.11554), an extra: `pip install subdermal[bayes]`. R-hat and effective sizes are its split
@@ -31,7 +31,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.errors import InputError
-from analysis.options import OVERALL
+from analysis.options import OVERALL, Options
 from analysis.responses import Responses
 
 #: Beyond these a posterior is said not to be one: of all parameters the largest R-hat, the smallest
@@ -39,30 +39,6 @@ from analysis.responses import Responses
 MOST_R_HAT, FEWEST_DRAWS = 1.01, 400
 #: Name of the rows of an image of the same sort that nobody has seen.
 NEW_IMAGE = "new image"
-#: Standard deviations of the priors, logits.
-PRIORS = {"worth": 2.0, "image": 1.0, "taste": 1.0, "person_side": 1.0, "side": 1.0}
-STEPS = (1.0, 2.0)
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """How the posterior is drawn: chains of so many draws each, after as many of warm-up."""
-
-    chains: int = 4
-    draws: int = 1000
-    warmup: int = 1000
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("chains", 2, 64),
-            ("draws", 100, 100_000),
-            ("warmup", 100, 100_000),
-            ("seed", 0, 2**31 - 1),
-        ):
-            value = getattr(self, name)
-            if not isinstance(value, int) or not low <= value <= high:
-                raise InputError(f"{name} is {value!r}; expected an integer from {low} to {high}")
 
 
 @dataclass(frozen=True)
@@ -84,16 +60,16 @@ class Posterior:
     thresholds: np.ndarray
     spread: Mapping[str, np.ndarray]
     divergences: int
-    sampling: Sampling
+    options: Options
 
     @cached_property
     def at_new_image(self) -> np.ndarray:
         """worth (chains, draws, n) at an image of the same sort that nobody has seen."""
-        rng = np.random.default_rng([self.sampling.seed, 1])
+        rng = np.random.default_rng([self.options.seed, 1])
         gained = rng.normal(size=self.worth.shape) * self.spread["image"][..., None]
         return self.worth + gained - gained.mean(axis=-1, keepdims=True)
 
-    def worths(self, level: float = 0.95) -> pd.DataFrame:
+    def worths(self) -> pd.DataFrame:
         """framing, technique, median, low, high, p_best; for 'overall', 'new image' (where there
         are several) and every image. Intervals are central; p_best: the chance of the largest
         worth.
@@ -102,19 +78,21 @@ class Posterior:
         for name, draws in self._places.items():
             best = np.bincount(draws.argmax(axis=1), minlength=len(self.techniques)) / len(draws)
             for k, technique in enumerate(self.techniques):
-                rows.append((name, technique, *_summary(draws[:, k], level), best[k]))
+                rows.append((name, technique, *_summary(draws[:, k], self.options.level), best[k]))
         return pd.DataFrame(
             rows, columns=["framing", "technique", "median", "low", "high", "p_best"]
         )
 
-    def pairs(self, level: float = 0.95) -> pd.DataFrame:
+    def pairs(self) -> pd.DataFrame:
         """framing, a, b, median, low, high, p_a_better: of worth of a less worth of b."""
         rows = []
         for name, draws in self._places.items():
             for i, j in combinations(range(len(self.techniques)), 2):
                 apart = draws[:, i] - draws[:, j]
                 names = (self.techniques[i], self.techniques[j])
-                rows.append((name, *names, *_summary(apart, level), float((apart > 0).mean())))
+                rows.append(
+                    (name, *names, *_summary(apart, self.options.level), float((apart > 0).mean()))
+                )
         columns = ["framing", "a", "b", "median", "low", "high", "p_a_better"]
         return pd.DataFrame(rows, columns=columns)
 
@@ -140,9 +118,9 @@ class Posterior:
         ]
         return pd.DataFrame(rows, columns=["parameter", "r_hat", "ess"])
 
-    def parameters(self, level: float = 0.95) -> pd.DataFrame:
+    def parameters(self) -> pd.DataFrame:
         """parameter, median, low, high, r_hat, ess; spreads, side, thresholds and worths."""
-        rows = [(name, *_summary(draws, level)) for name, draws in self._named.items()]
+        rows = [(name, *_summary(draws, self.options.level)) for name, draws in self._named.items()]
         table = pd.DataFrame(rows, columns=["parameter", "median", "low", "high"])
         return table.merge(self.trust, on="parameter")
 
@@ -193,10 +171,13 @@ def _summary(draws: np.ndarray, level: float) -> tuple[float, float, float]:
 
 
 def sample(
-    responses: Responses, sampling: Sampling | None = None, progress: bool = False
+    responses: Responses, options: Options | None = None, progress: bool = False
 ) -> Posterior:
-    """Draw the posterior of a table of answers; InputError where the sampler is not installed."""
-    sampling = sampling or Sampling()
+    """Draw the posterior of a table of answers, by `options.posterior`, its seed and its level;
+    InputError where the sampler is not installed.
+    """
+    options = options or Options()
+    sampling = options.posterior
     if util.find_spec("numpyro") is None:
         raise InputError(
             "the Bayesian model needs the sampler NumPyro, which is not installed; expected "
@@ -211,21 +192,21 @@ def sample(
     data = _data(responses)
     several = jax.local_device_count() >= sampling.chains
     mcmc = numpyro.infer.MCMC(
-        numpyro.infer.NUTS(_model, target_accept_prob=0.95),
+        numpyro.infer.NUTS(_model, target_accept_prob=sampling.target_acceptance),
         num_warmup=sampling.warmup,
         num_samples=sampling.draws,
         num_chains=sampling.chains,
         chain_method="parallel" if several else "sequential",
         progress_bar=progress,
     )
-    mcmc.run(jax.random.PRNGKey(sampling.seed), **data)
+    mcmc.run(jax.random.PRNGKey(options.seed), priors=sampling.priors, **data)
     drawn = {name: np.asarray(v) for name, v in mcmc.get_samples(group_by_chain=True).items()}
     return _posterior(
         responses,
         data,
         drawn,
         int(np.asarray(mcmc.get_extra_fields()["diverging"]).sum()),
-        sampling,
+        options,
     )
 
 
@@ -258,14 +239,14 @@ def _techniques(responses: Responses) -> list[str]:
     return [name for name in responses.codebook.techniques if name in seen]
 
 
-def _model(left, right, person, picture, category, techniques, people, pictures):
+def _model(priors, left, right, person, picture, category, techniques, people, pictures):
     import jax.numpy as jnp
     import numpyro
     from jax.nn import log_sigmoid
     from numpyro import distributions as dist
 
     def spread(name):
-        return numpyro.sample(f"sd_{name}", dist.HalfNormal(PRIORS[name]))
+        return numpyro.sample(f"sd_{name}", dist.HalfNormal(priors[name]))
 
     def effects(name, *shape):
         size = dist.Normal(0, 1).expand(shape).to_event(len(shape))
@@ -275,9 +256,10 @@ def _model(left, right, person, picture, category, techniques, people, pictures)
     taste = effects("taste", people, techniques)
     # one image cannot tell what is its own from what is the technique's
     image = effects("image", pictures, techniques) if pictures > 1 else jnp.zeros((1, techniques))
-    side = numpyro.sample("side", dist.Normal(0, PRIORS["side"]))
+    side = numpyro.sample("side", dist.Normal(0, priors["side"]))
     leaning = side + effects("person_side", people)[person]
-    step = numpyro.sample("step", dist.HalfNormal(jnp.array(STEPS)).to_event(1))
+    steps = jnp.array([priors["slight"], priors["clear"]])
+    step = numpyro.sample("step", dist.HalfNormal(steps).to_event(1))
     slight, clear = step[0], step[0] + step[1]
 
     def value(technique):
@@ -296,7 +278,7 @@ def _posterior(
     data: Mapping,
     drawn: Mapping[str, np.ndarray],
     divergences: int,
-    sampling: Sampling,
+    options: Options,
 ) -> Posterior:
     """The draws as effects about their means: a constant in all worths changes no answer."""
     names = _techniques(responses)
@@ -321,5 +303,5 @@ def _posterior(
         np.cumsum(drawn["step"], axis=-1),
         {name: drawn[f"sd_{name}"] for name in spreads},
         divergences,
-        sampling,
+        options,
     )

@@ -11,8 +11,8 @@ from analysis.codebook import Codebook
 from analysis.figures import BLUE, SIMULATED, Picture
 from analysis.files import csv_bytes
 from analysis.methods import versions
-from analysis.options import OVERALL
-from analysis.posterior.model import NEW_IMAGE, PRIORS, STEPS, Posterior
+from analysis.options import OVERALL, Options
+from analysis.posterior.model import NEW_IMAGE, Posterior
 from analysis.responses import Responses
 from analysis.worth_figures import rungs
 
@@ -27,15 +27,17 @@ NAMES = {
 
 
 def posterior_files(
-    found: Posterior, responses: Responses, level: float = 0.95, command: str = ""
+    found: Posterior, responses: Responses, command: str = "", fingerprint: str = ""
 ) -> tuple[dict[str, bytes], list[str]]:
-    """The files, path -> content, and what they say in short, a sentence each, doubts first."""
-    codebook, simulated = responses.codebook, responses.simulated
-    worths, pairs, parameters = found.worths(level), found.pairs(level), found.parameters(level)
-    sentences = [*_doubts(found), *_best(found, worths, codebook), *_images(found, level)]
+    """The files, path -> content, and what they say in short, a sentence each, doubts first;
+    fingerprint: of what the study declares, see `analysis.declared`.
+    """
+    codebook, simulated, level = responses.codebook, responses.simulated, found.options.level
+    worths, pairs, parameters = found.worths(), found.pairs(), found.parameters()
+    sentences = [*_doubts(found), *_best(found, worths, codebook), *_images(found)]
     tables = {"posterior_worths": worths, "posterior_pairs": pairs}
     tables |= {"posterior_parameters": parameters}
-    page = _page(found, responses, tables, sentences, level, command)
+    page = _page(found, responses, tables, sentences, command, fingerprint)
     files = {
         f"{name}.csv": csv_bytes(table.assign(simulated=int(simulated)), 6)
         for name, table in tables.items()
@@ -74,8 +76,9 @@ def _best(found: Posterior, worths: pd.DataFrame, codebook: Codebook) -> list[st
     return sentences
 
 
-def _images(found: Posterior, level: float) -> list[str]:
+def _images(found: Posterior) -> list[str]:
     """What one image can change."""
+    level = found.options.level
     if len(found.images) < 2:
         return ["One kind of image was shown: nothing is said of others."]
     low, middle, high = np.quantile(found.spread["image"], [(1 - level) / 2, 0.5, (1 + level) / 2])
@@ -85,16 +88,24 @@ def _images(found: Posterior, level: float) -> list[str]:
     ]
 
 
+def _origin(options: Options) -> str:
+    """Where priors and sampling come from."""
+    names = [name.partition(".")[2] for name in options.declared if name.startswith("posterior.")]
+    if not names:
+        return "No prior was declared in a study file: they are defaults or were given."
+    return f"Declared in the study file: {', '.join(names)}; the others are defaults or were given."
+
+
 def _page(
     found: Posterior,
     responses: Responses,
     tables: dict[str, pd.DataFrame],
     sentences: list[str],
-    level: float,
     command: str,
+    fingerprint: str,
 ) -> str:
-    codebook, sampling = responses.codebook, found.sampling
-    percent = f"{100 * level:g} %"
+    codebook, sampling = responses.codebook, found.options.posterior
+    percent = f"{100 * found.options.level:g} %"
     lines = ["# What the answers make of the techniques, by a Bayesian model", ""]
     if responses.simulated:
         lines += [f"**{SIMULATED}**", ""]
@@ -133,25 +144,22 @@ def _page(
             f"| {label} | {row.median:z.2f} | {row.low:z.2f} to {row.high:z.2f} | "
             f"{row.r_hat:.3f} | {row.ess:.0f} |"
         )
-    priors = ", ".join(
-        f"{name} {value:g}"
-        for name, value in (
-            ("the spread of worths", PRIORS["worth"]),
-            ("of images", PRIORS["image"]),
-            ("of tastes", PRIORS["taste"]),
-            ("of leanings to a side", PRIORS["person_side"]),
-        )
-    )
+    priors = sampling.priors
     lines += [
         "",
         "## How",
         "",
         "- Cumulative logits with thresholds symmetric about 0, a side effect, and crossed random "
         "effects of people and images (`analysis/posterior/model.py`).",
-        f"- Priors, half-normal: {priors}; the steps of the thresholds {STEPS[0]:g} and "
-        f"{STEPS[1]:g}; normal: the side {PRIORS['side']:g} logits.",
+        f"- Priors, half-normal, logits: the spread of worths {priors['worth']:g}, of images "
+        f"{priors['image']:g}, of tastes {priors['taste']:g}, of leanings to a side "
+        f"{priors['person_side']:g}; the steps of the thresholds {priors['slight']:g} and "
+        f"{priors['clear']:g}; normal: the side {priors['side']:g}.",
         f"- {sampling.chains} chains of {sampling.draws} draws after {sampling.warmup} of warm-up, "
-        f"No-U-Turn sampler, seed {sampling.seed}.",
+        f"No-U-Turn sampler aiming at an acceptance of {sampling.target_acceptance:g}, seed "
+        f"{found.options.seed}.",
+        f"- {_origin(found.options)}",
+        *([f"- sha256 of the study's [analysis]: {fingerprint}."] if fingerprint else []),
         f"- Answers: {responses.source}, sha256 {responses.sha256}.",
         "- " + ", ".join(f"{k} {v}" for k, v in versions(("jax", "numpyro")).items()) + ".",
     ]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
 from app.answers import names, read_answers, study_option, tell, varied_option, written
+
+# matrices are small: a second thread of OpenBLAS adds a fifth of the CPU; read when numpy is loaded
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @click.command()
@@ -134,33 +138,18 @@ def command(
                 f"{', '.join(unused)} cannot go with --matrices, which has its own names and order"
             )
         found = read_matrices(matrices)
-        files = report_matrices(
-            found, matrices.name, written("analyse", ("--matrices", matrices.name))
-        )
+        files = report_matrices(found, matrices.name, written())
         write_files(files, out)
         click.echo(f"{out / 'report.html'}: priorities of {len(found)} matrices")
         return
 
     answers, manifest, study = read_answers(responses, study, order, factor, varied)
-    options = [
-        (option, ",".join(value))
-        for option, value in (("--order", order), ("--pair", pair), ("--varied", varied))
-        if value
-    ]
-    options += [("--factor", factor)] if factor else []
-    options += [
-        (f"--{name.replace('_', '-')}", str(value))
-        for name, value in choices.items()
-        if value is not None
-    ]
-    if study is not None:
-        options.append(("--study", study.name))
     declared = manifest.declared if manifest else {}
     chosen = declarations.options(declared, f"{study}: study.analysis", **choices)
     files = report_responses(
         answers,
         pair,
-        written("analyse", (responses.name,), *options),
+        written(),
         chosen,
         _source(declared, choices),
         read_measures(manifest, reference, factor or FRAMING) if manifest else None,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from app.answers import read_answers, study_option, tell, varied_option, written
+from app.answers import numbers, read_answers, study_option, tell, varied_option, written
 
 
 @click.command()
@@ -20,47 +21,70 @@ from app.answers import read_answers, study_option, tell, varied_option, written
 )
 @study_option
 @varied_option
-@click.option("--chains", default=4, show_default=True, type=int, help="Chains, 2 or more.")
-@click.option("--draws", default=1000, show_default=True, type=int, help="Draws of each chain.")
+@click.option("--chains", type=int, help="Chains, 2 or more. Without it as declared, or 4.")
+@click.option("--draws", type=int, help="Draws of each chain. Without it as declared, or 1000.")
 @click.option(
-    "--warmup", default=1000, show_default=True, type=int, help="Steps before the first draw."
+    "--warmup", type=int, help="Steps before the first draw. Without it as declared, or 1000."
+)
+@click.option(
+    "--target-acceptance",
+    type=float,
+    help="The share of steps to accept; nearer to 1 the steps are smaller. Else declared, or 0.95.",
+)
+@click.option(
+    "--prior",
+    "priors",
+    multiple=True,
+    callback=numbers,
+    metavar="NAME=LOGITS",
+    help=(
+        "The scale of a prior, repeated for several: worth, image, taste, person_side, side, "
+        "slight, clear. Without it as declared in [analysis.posterior], or 1; worth and clear 2."
+    ),
 )
 @click.option(
     "--seed",
-    default=0,
-    show_default=True,
     type=int,
-    help="The same seed gives the same draws on one machine.",
+    help="The same seed gives the same draws on one machine. Without it as declared, or 0.",
 )
 @click.option(
-    "--level", default=0.95, show_default=True, type=float, help="Level of the intervals."
+    "--level", type=float, help="Level of the intervals. Without it as declared, or 0.95."
 )
 def command(
     responses: Path,
     out: Path,
     study: Path | None,
     varied: tuple[str, ...] | None,
-    level: float,
-    **sampling: int,
+    priors: dict[str, float],
+    seed: int | None,
+    level: float | None,
+    **sampling: float | None,
 ) -> None:
     """Draw the posterior of a multilevel model of RESPONSES, a responses.csv.
 
     People and images are both samples, so that it also says what would hold for another image of
-    the same sort. Needs the extra `subdermal[bayes]`.
+    the same sort. Needs the extra `subdermal[bayes]`. Nothing is written before the last draw:
+    sampling that is interrupted begins anew.
     """
-    from analysis.options import Options
-    from analysis.posterior import Sampling, posterior_files, sample
+    from analysis import declared as declarations
+    from analysis.options import Sampling
+    from analysis.posterior import posterior_files, sample
     from analysis.report import write_files
 
-    level = Options(level=level).level  # checked
-    drawing = Sampling(**sampling)
-    answers, _, study = read_answers(responses, study, varied=varied)
-    found = sample(answers, drawing, progress=sys.stderr.isatty())
-    words = [(f"--{name}", str(value)) for name, value in {**sampling, "level": level}.items()]
-    words += [("--varied", ",".join(varied))] if varied else []
-    words += [("--study", study.name)] if study else []
-    line = written("posterior", (responses.name,), *words)
-    files, sentences = posterior_files(found, answers, level, line)
+    if unknown := [name for name in priors if name not in Sampling().priors]:
+        raise click.UsageError(
+            f"--prior names {', '.join(unknown)}; expected one of {', '.join(Sampling().priors)}"
+        )
+    answers, manifest, study = read_answers(responses, study, varied=varied)
+    declared = manifest.declared if manifest else {}
+    options = declarations.options(declared, f"{study}: study.analysis", level=level, seed=seed)
+    given = {name: value for name, value in sampling.items() if value is not None}
+    given |= {f"prior_{name}": value for name, value in priors.items()}
+    options = replace(options, posterior=replace(options.posterior, **given))
+    found = sample(answers, options, progress=sys.stderr.isatty())
+    files, sentences = posterior_files(
+        found, answers, written(), declarations.fingerprint(declared)
+    )
     write_files(files, out)
     tell(responses, answers)
     for sentence in sentences:

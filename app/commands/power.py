@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from app.answers import names
-
-
-def worths(
-    ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]
-) -> dict[str, float]:
-    """('a=0.3', 'b=-1') as {'a': 0.3, 'b': -1}."""
-    found = {}
-    for text in values:
-        name, _, number = text.partition("=")
-        try:
-            found[name.strip()] = float(number)
-        except ValueError:
-            raise click.BadParameter(f"{text!r} is no TECHNIQUE=JOD, such as golubev=0.4") from None
-    return found
+from app.answers import names, numbers, written
 
 
 @click.command()
@@ -55,7 +40,7 @@ def worths(
     "--worth",
     "assumed",
     multiple=True,
-    callback=worths,
+    callback=numbers,
     metavar="TECHNIQUE=JOD",
     help=(
         "An assumed worth, repeated for each technique; what is not named is 0. The pair is "
@@ -237,33 +222,10 @@ def command(
         lambda steps: tqdm(steps, desc="simulated studies", unit="design", disable=None),
     )
     fingerprint = declared.fingerprint(definition.analysis)
-    files, sentences = power_files(
-        plan, curves, needed, codebook, source, _written(study), fingerprint
-    )
+    files, sentences = power_files(plan, curves, needed, codebook, source, written(), fingerprint)
     write_files(files, out)
     for sentence in sentences:
         click.echo(sentence)
     if fingerprint:
         click.echo(f"sha256 of the study's [analysis]: {fingerprint}")
     click.echo(f"{out / 'power.md'}: {studies} simulated studies for each design, seed {seed}")
-
-
-def _written(study: Path) -> str:
-    """The command as the page shows it: what was given, without folders, so that it says nothing of
-    the machine.
-    """
-    context = click.get_current_context()
-    words = ["subdermal", "power", study.name]
-    for parameter in context.command.params:
-        given = (
-            context.get_parameter_source(parameter.name) is click.core.ParameterSource.COMMANDLINE
-        )
-        if isinstance(parameter, click.Option) and given and parameter.name != "out":
-            value = context.params[parameter.name]
-            if isinstance(value, dict):
-                value = tuple(f"{name}={number:g}" for name, number in value.items())
-            elif parameter.name == "pair":
-                value = (",".join(value),)
-            for one in value if isinstance(value, tuple) else (value,):
-                words += [parameter.opts[0], one.name if isinstance(one, Path) else f"{one}"]
-    return shlex.join([*words, "--out", "DIR"])

@@ -10,16 +10,16 @@ from numpyro import handlers
 from scipy.special import expit
 
 from analysis import responses_from_records
-from analysis.options import Options
+from analysis.options import Options, Sampling
 from analysis.panel import panels
-from analysis.posterior import Sampling, model, posterior_files, sample
+from analysis.posterior import model, posterior_files, sample
 from analysis.worth import ordinal_fit
 from analysis.worth.ordinal import Cells
 
 TECHNIQUES = ("none", "golubev", "gaussian")
 WORTH = np.array([-0.9, 0.6, 0.3])
 CUTS = np.array([-2.0, -0.6, 0.6, 2.0])
-SHORT = Sampling(chains=2, draws=100, warmup=100)
+SHORT = Options(posterior=Sampling(chains=2, draws=100, warmup=100))
 
 
 def answers(people, gains, seed, taste=0.4, side=0.3, simulated=False):
@@ -53,7 +53,7 @@ def table():
 
 @pytest.fixture(scope="module")
 def drawn(table):
-    return sample(table, Sampling(chains=2, draws=1600, warmup=600, seed=1))
+    return sample(table, Options(seed=1, posterior=Sampling(chains=2, draws=1600, warmup=600)))
 
 
 def test_the_likelihood_is_that_of_the_ordinal_model(table):
@@ -70,7 +70,9 @@ def test_the_likelihood_is_that_of_the_ordinal_model(table):
         "side": 0.4,
         "step": np.array([0.5, 1.1]),
     }
-    trace = handlers.trace(handlers.substitute(model._model, values)).get_trace(**data)
+    trace = handlers.trace(handlers.substitute(model._model, values)).get_trace(
+        priors=Sampling().priors, **data
+    )
     got = float(trace["answers"]["fn"].log_factor)
     who, where = data["person"], data["picture"]
     worth = (
@@ -109,7 +111,7 @@ def test_a_new_image_is_less_certain_than_those_seen(drawn):
 def test_one_image_says_nothing_of_others_and_is_near_maximum_likelihood():
     """120 people: the priors pull by less than half of the fit's standard errors."""
     table = answers(120, [[0.0, 0.0, 0.0]], 5)
-    found = sample(table, Sampling(chains=2, draws=500, warmup=500))
+    found = sample(table, Options(posterior=Sampling(chains=2, draws=500, warmup=500)))
     worths = found.worths()
     assert set(worths.framing) == {"overall"} and "image" not in found.spread
     panel = panels(table)["image0"]
@@ -139,11 +141,16 @@ def test_the_command_writes_tables_draws_a_figure_and_a_page(run, tmp_path, simu
     rows[columns].to_csv(tmp_path / "responses.csv", index=False)
     out = tmp_path / "out"
     path, few = tmp_path / "responses.csv", ("--chains", 2, "--draws", 100, "--warmup", 100)
+    few = (*few, "--prior", "worth=0.5", "--prior", "clear=1.5")
     code, said, _ = run("posterior", path, "--out", out, *map(str, few))
     assert code == 0 and "is the best with probability" in said
     page = (out / "posterior.md").read_text()
     assert ("SIMULATED" in page) == simulated
-    assert "--chains 2 --draws 100" in page and str(tmp_path) not in page
+    assert (
+        "subdermal posterior responses.csv --chains 2 --draws 100 --warmup 100 --prior worth=0.5 "
+        "--prior clear=1.5 --out DIR"
+    ) in page
+    assert "the spread of worths 0.5, of images 1, of" in page and "thresholds 1 and 1.5" in page
     for name in ("worths", "pairs", "parameters"):
         header = (out / f"posterior_{name}.csv").read_text().splitlines()
         assert header[0].endswith(",simulated") and header[1].endswith(f",{int(simulated)}")

@@ -4,8 +4,9 @@ from importlib import util
 
 import pytest
 
+from analysis import declared
 from analysis.errors import InputError
-from analysis.posterior import Sampling
+from analysis.options import Sampling
 
 ROWS = "participant,framing,left,right,answer\nP1,front,a,b,1\nP2,front,b,a,-1\n"
 
@@ -21,7 +22,12 @@ def test_the_extra_is_named(run, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("option", "message"),
-    [(("--chains", "1"), "chains is 1"), (("--level", "1.5"), "level is 1.5")],
+    [
+        (("--chains", "1"), "chains is 1"),
+        (("--level", "1.5"), "level is 1.5"),
+        (("--prior", "width=2"), "--prior names width; expected one of worth, image"),
+        (("--prior", "worth"), "'worth' is no NAME=LOGITS"),
+    ],
 )
 def test_what_cannot_be_drawn_is_one_line(run, tmp_path, option, message):
     (tmp_path / "responses.csv").write_text(ROWS)
@@ -30,6 +36,17 @@ def test_what_cannot_be_drawn_is_one_line(run, tmp_path, option, message):
     assert code == 2 and message in err and err.count("\n") == 1
 
 
-def test_sampling_is_checked():
-    with pytest.raises(InputError, match="seed is -1; expected an integer from 0"):
-        Sampling(seed=-1)
+def test_sampling_and_priors_are_declared_and_checked():
+    found = declared.options({"posterior": {"prior_worth": 1.5, "chains": 2}})
+    assert found.posterior == Sampling(chains=2, prior_worth=1.5)
+    assert found.posterior.priors["worth"] == 1.5 and found.posterior.priors["clear"] == 2
+    assert found.declared == ("posterior.prior_worth", "posterior.chains")
+    for wrong, words in (
+        ({"prior_worth": 0}, r"posterior\.prior_worth is 0, expected a number above 0"),
+        ({"target_acceptance": 1}, r"posterior\.target_acceptance is 1, expected .* below 1"),
+        ({"draws": 7}, r"posterior\.draws is 7, expected an integer from 100"),
+        ({"prior_taste": "wide"}, r"posterior\.prior_taste is 'wide', expected a number"),
+        ({"prior": 1}, r"posterior names the unknown prior"),
+    ):
+        with pytest.raises(InputError, match=words):
+            declared.options({"posterior": wrong})
