@@ -12,6 +12,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import pandas as pd
 
@@ -87,6 +88,7 @@ def read(name: str, data: bytes, columns: Sequence[str]) -> Rows:
     if twice:
         raise InputError(f"{name}: has the column {', '.join(twice)} twice")
     places, width = [header.index(column) for column in wanted], len(header)
+    chosen = itemgetter(*places) if len(places) > 1 else lambda row: [row[k] for k in places]
     reader = csv.reader(iter(lines[start:]), strict=True, delimiter=separator)
     next(reader)
     cells, spans, faults = [], [], []
@@ -106,7 +108,7 @@ def read(name: str, data: bytes, columns: Sequence[str]) -> Rows:
         if not row or (len(row) > 1 and not any(map(str.strip, row))):
             continue  # an empty line, or one of separators alone, as spreadsheets leave them
         if len(row) == width:
-            cells.append(tuple(row[place].strip() for place in places))
+            cells.append(tuple([cell.strip() for cell in chosen(row)]))
             spans.append((first, reader.line_num + start))
         else:
             reason = f"has {len(row)} fields, expected {width} as in the header"
@@ -153,7 +155,8 @@ def numbers(cells: pd.Series, pattern: str, separator: str = ",") -> Numbers:
     has another count than three digits behind it; '1,500' alone may also be a thousand and a half,
     and is missing. A true minus sign is a minus.
     """
-    text, notes = cells, []
+    codes, different = pd.factorize(cells, use_na_sentinel=False)  # each text is read once
+    text, notes = pd.Series(different, dtype=object), []
     minus = text.str.startswith("\N{MINUS SIGN}")
     if minus.any():
         text = text.str.replace("\N{MINUS SIGN}", "-", n=1)
@@ -164,7 +167,7 @@ def numbers(cells: pd.Series, pattern: str, separator: str = ",") -> Numbers:
             text = text.mask(comma, text.str.replace(",", ".", n=1))
             notes.append("decimal commas")
     values = pd.to_numeric(text.where(text.str.fullmatch(pattern)), errors="coerce")
-    return Numbers(values.astype(float), tuple(notes))
+    return Numbers(pd.Series(values.to_numpy(float)[codes], index=cells.index), tuple(notes))
 
 
 def times(cells: pd.Series) -> Numbers:
