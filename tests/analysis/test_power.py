@@ -30,6 +30,7 @@ from analysis.planning import (
     t_power,
     tost_power,
 )
+from analysis.planning.words import _adaptive
 from app.cli import main
 
 THESIS = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
@@ -277,6 +278,20 @@ def test_designs_ask_what_they_say_and_everyone_is_asked_so_many():
         run, _ = run_of(plan(studies=50, most=40, answers_each=4), design)
         assert (run.asked.sum(axis=3) == each).all()
         assert run.asked.any(axis=(0, 1, 2)).all()
+
+
+@pytest.mark.parametrize(("people", "said"), [(70, "70 people against 66"), (40, "")])
+def test_an_adaptive_design_that_saves_nobody_is_said(people, said):
+    needed = pd.DataFrame(
+        [
+            ("any", design, "find", "declared", "family", count)
+            for design, count in (("adaptive", people), ("incomplete", 66))
+        ],
+        columns=["framing", "design", "goal", "test", "correction", "people"],
+    )
+    found = _adaptive(Plan(THESIS, PAIR), needed, None)
+    assert len(found) == (1 if said else 0)
+    assert all(f"no better than pairs drawn by lot: {said}" in sentence for sentence in found)
 
 
 def test_the_adaptive_design_asks_near_pairs_more_often_than_far_ones():
