@@ -66,9 +66,28 @@ class Priorities:
     def verdict(self) -> str:
         if self.cr is None:
             return "no consistency ratio: there is no random index beyond 10 items"
+        if len(self.vector) < 3:
+            return "one judgement, which nothing can contradict"
         if self.cr >= 0.1:
             return "incoherent: from 0.1 on, the method of asking should change"
         return "coherent" if self.cr < 0.01 else "acceptably coherent (below 0.1)"
+
+    def sentence(self, chance: float = np.nan) -> str:
+        """Saaty's verdict in words; chance: the share of answers without any preference that look
+        as coherent, NaN where it is not known.
+        """
+        if self.cr is None:
+            return f"There is {self.verdict}."
+        if len(self.vector) < 3:
+            return f"Two techniques have {self.verdict}: CR says nothing."
+        words = f"The judgements are {self.verdict} by Saaty's rule, CR {self.cr:z.3f}"
+        if np.isnan(chance):
+            return words + "."
+        return (
+            f"{words}; of random answers of this design, directions settled by a coin, "
+            f"{100 * chance:.0f} % have a CR as low"
+            + (", so that it shows no coherence." if chance > 0.05 else ".")
+        )
 
 
 def judgements(preference: np.ndarray) -> np.ndarray:

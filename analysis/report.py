@@ -24,6 +24,7 @@ from analysis import (
     latex,
     methods,
     objective,
+    remarks,
     shown,
     tallies,
     worth_figures,
@@ -38,7 +39,7 @@ from analysis.files import csv_bytes, replacing
 from analysis.methods import rejected_rows
 from analysis.methods import versions as _versions
 from analysis.objective import Measured
-from analysis.options import OVERALL, Options
+from analysis.options import Options
 from analysis.responses import Responses
 from analysis.shown import NOTHING
 
@@ -145,11 +146,20 @@ def report_responses(
     cited = {key: place for place, key in enumerate(methods.keys_in(used), start=1)}
     references = [methods.REFERENCES[key] for key in cited]
     numbered = [(heading, methods.cited(words, cited)) for heading, words in text]
+    beside_tables = remarks.topics(results.notes, responses.notes, codebook)
     more = {
         "methods.md": methods.markdown(responses, options, declared, command).encode(),
-        "report.tex": latex.document(read.values(), title, simulated).encode(),
+        "report.tex": latex.document(read.values(), title, simulated, beside_tables).encode(),
         "report.pdf": _pdf(
-            title, subtitle, summary, pictures, list(read.values()), numbered, references, simulated
+            title,
+            subtitle,
+            summary,
+            pictures,
+            list(read.values()),
+            beside_tables,
+            numbered,
+            references,
+            simulated,
         ),
     }
     return _files(
@@ -161,10 +171,7 @@ def report_responses(
         simulated=simulated,
         summary=[(heading, sentences) for heading, sentences in summary if sentences],
         shown=read,
-        remarks={
-            name: [_plain(line, codebook) for line in lines]
-            for name, lines in results.notes.items()
-        },
+        remarks={name: remarks.remarks(lines, codebook) for name, lines in results.notes.items()},
         methods=numbered,
         references=references,
         declared=declared,
@@ -192,7 +199,7 @@ def report_responses(
         framings=[codebook.framing_label(name) for name in codebook.framings],
         framing_rule=codebook.framing_rule,
         codebook=codebook,
-        notes=[_plain(note, codebook) for note in responses.notes],
+        notes=[remarks.plain(note, codebook) for note in responses.notes],
         findings=responses.findings[:SHOWN_ROWS],
         rows=responses.rows,
         when=_when(responses),
@@ -230,7 +237,7 @@ def report_matrices(
                 [
                     f"{codebook.framing_label(name)}: highest priority for "
                     f"{_listed(_first(share, codebook))}, "
-                    f"{max(share.values()):.3f}. {_coherence(found[name])}"
+                    f"{max(share.values()):.3f}. {found[name].sentence()}"
                     for name, share in shares.items()
                 ],
             )
@@ -336,46 +343,6 @@ def _pdf(*parts: object) -> bytes:
     return pdf.make(*parts)
 
 
-#: Words for the names of columns and statistics that notes are written in.
-NAMES = {
-    **conclusions.MODEL_NAMES,
-    "holm_p": "Holm's p",
-    "log_nu": "log nu",
-    "kendall_u_conditional": "Kendall's u with ties kept",
-    "kendall_u": "Kendall's u",
-    "krippendorff_alpha": "Krippendorff's alpha",
-    "side_effect": "side effect",
-    "one_side_share": "of one side",
-    "answered_share": "of answered questions",
-    "same_answer_share": "of the same answer",
-    "median_rt_ms": "of the median time",
-    "repeat_share": "of answers when asked again",
-    "trap_share": "of answers to trap pairs",
-    "strength_slope": "Strength over the order",
-    "side_slope": "Side over the order",
-    "time_slope": "Time over the order",
-    "carry_over": "Carry-over",
-    "rt_ms": "the time of an answer",
-    "started_at": "when a question was shown",
-}
-
-
-def _plain(line: str, codebook: Codebook) -> str:
-    """A note of the computation as a sentence of the page: labels and words for names."""
-    name, mark, rest = line.partition(":")
-    head, comma, model = name.partition(", ")
-    if mark and head in (*codebook.framings, OVERALL):
-        line = f"{worth_figures.framing_label(codebook, head)}{comma}{model}:{rest}"
-    line = re.sub(
-        r"(?<![\w-])("
-        + "|".join(sorted(map(re.escape, NAMES), key=len, reverse=True))
-        + r")(?!\w)",
-        lambda match: NAMES[match[0]],
-        conclusions.with_labels(line, codebook),
-    )
-    return (line[:1].upper() + line[1:]).rstrip(".") + "."
-
-
 def _digits(value: float | None, digits: int = 3) -> str:
     return NOTHING if value is None or np.isnan(value) else f"{value:z.{digits}f}"
 
@@ -424,7 +391,7 @@ def _matrices(
             ],
             "missing": [f"{codebook.label(a)} with {codebook.label(b)}" for a, b in one.missing],
             "found": found.get(name),
-            "words": _coherence(found[name], (chance or {}).get(name, np.nan))
+            "words": found[name].sentence((chance or {}).get(name, np.nan))
             if name in found
             else "",
         }
@@ -503,7 +470,7 @@ def _summary(
                         f"first{' too' if top == best else ''}."
                     )
         if framing in found:
-            words += f" {_coherence(found[framing], chance.get(framing, np.nan))}"
+            words += f" {found[framing].sentence(chance.get(framing, np.nan))}"
         elif comparisons[framing].missing:
             words += (
                 f" No priorities: {_count(len(comparisons[framing].missing), 'pair')} "
@@ -514,7 +481,9 @@ def _summary(
         strength = totals.mean_strength.to_numpy()
         steps = np.diff(strength)
         way = "neither only weaken nor only grow"
-        if (steps < 0).all() or (steps > 0).all():
+        if (steps == 0).all():
+            way = "do not change"
+        elif (steps < 0).all() or (steps > 0).all():
             way = f"get {'weaker' if steps[0] < 0 else 'stronger'} with every step"
         values = ", ".join(
             f"{row.mean_strength:.2f} ({codebook.framing_label(row.framing)})"
@@ -567,19 +536,3 @@ def _first(values: Mapping[str, float], codebook: Codebook) -> list[str]:
     return [
         codebook.label(name) for name, value in values.items() if np.isclose(value, top, rtol=1e-9)
     ]
-
-
-def _coherence(found: Priorities, chance: float = np.nan) -> str:
-    """Saaty's verdict, and how often answers without any preference look as coherent."""
-    if found.cr is None:
-        return f"There is {found.verdict}."
-    if len(found.vector) < 3:
-        return "Two techniques have one judgement, which nothing can contradict: CR says nothing."
-    words = f"The judgements are {found.verdict} by Saaty's rule, CR {found.cr:z.3f}"
-    if np.isnan(chance):
-        return words + "."
-    return (
-        f"{words}; of random answers of this design, directions settled by a coin, "
-        f"{100 * chance:.0f} % have a CR as low"
-        + (", so that it shows no coherence." if chance > 0.05 else ".")
-    )

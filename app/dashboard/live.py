@@ -228,8 +228,9 @@ def framings(answers: Responses | None, study: Study) -> list[dict[str, Any]]:
                 "label": answers.codebook.framing_label(framing),
                 "total": int(totals.total[framing]),
                 "answers": int(totals.answers[framing]),
-                "cr": priorities and priorities.cr,
-                "verdict": priorities.verdict if priorities else "some pairs have no answer yet",
+                "coherence": priorities.sentence()
+                if priorities
+                else "Some pairs have no answer yet.",
                 "techniques": [
                     {
                         "name": name,

@@ -85,6 +85,8 @@ def test_one_and_two_items_are_always_coherent():
         found = priorities(np.array(matrix))
         assert (found.ci, found.cr) == (0, 0)
     assert found.vector == pytest.approx([0.75, 0.25])
+    words = "Two techniques have one judgement, which nothing can contradict: CR says nothing."
+    assert found.sentence() == words
 
 
 def test_a_circle_is_incoherent():
