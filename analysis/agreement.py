@@ -213,7 +213,7 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
 def side_balance(responses: Responses, options: Options) -> pd.DataFrame:
     """framing, technique, left, right, left_share, p, holm_p: on which side each technique stood.
 
-    p: two-sided exact binomial of as often left as right; holm_p over the techniques of a framing.
+    p: two-sided exact binomial of as often left as right; holm_p over the declared family.
     Where sides were shuffled only chance makes them uneven; attrs['notes'] name the framings where
     side and technique are confounded, see `worth.confounded_side`.
     """
@@ -226,13 +226,14 @@ def side_balance(responses: Responses, options: Options) -> pd.DataFrame:
         left = np.array([(left_name == item).sum() for item in items])
         right = np.array([(right_name == item).sum() for item in items])
         p = np.minimum(1, 2 * stats.binom.cdf(np.minimum(left, right), left + right, 0.5))
-        values = zip(items, left, right, left / (left + right), p, inference.holm(p), strict=True)
+        values = zip(items, left, right, left / (left + right), p, strict=True)
         rows += [(name, *value) for value in values]
         reason = worth.confounded_side(panels(responses)[name])
         if reason:
             notes.append(f"{name}: {reason}")
-    columns = ["framing", "technique", "left", "right", "left_share", "p", "holm_p"]
-    return with_notes(rows, columns, notes)
+    table = with_notes(rows, ["framing", "technique", "left", "right", "left_share", "p"], notes)
+    table["holm_p"] = inference.holm_in_families(table, options)
+    return table
 
 
 def sensitivity(responses: Responses, options: Options) -> pd.DataFrame:
@@ -634,7 +635,10 @@ def _concordance(name: str, panel: Panel, options: Options, notes: list[str]) ->
     bounds = _jackknife(u, kendall_u(left_out), options.level)
     both, both_out = (np.concatenate([one, one[..., ::-1]], axis=-2) for one in (counts, left_out))
     alpha, alpha_both = float(krippendorff_alpha(counts)), float(krippendorff_alpha(both))
-    if np.isnan(alpha):
+    if len(panel.first) == 1:  # 0 by definition: one unit cannot differ from others
+        alpha, left_out = np.nan, left_out[:0]
+        notes.append(f"{name}: krippendorff_alpha has no number for one pair alone")
+    elif np.isnan(alpha):
         notes.append(f"{name}: krippendorff_alpha has no number where all answers are alike")
     return [
         ("kendall_u", u, *bounds, p),

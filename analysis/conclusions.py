@@ -29,6 +29,8 @@ MODEL_NAMES = {
 }
 #: How many pairs one sentence names; of more it gives the number.
 MOST = 8
+#: The tables that name the others.
+PAIRS, CONTRASTS = "the table of every pair", "the table of contrasts"
 
 
 @dataclass
@@ -105,11 +107,12 @@ def _about_pairs(
             f"{codebook.label(name)} over {listed([codebook.label(one) for one in over[name]])}"
             for name in order
         )
-        most = _equals(max(row.holm_p for row in differing)).replace("=", "at most")
+        most = _equals(max(row.holm_p for row in differing))
+        most = most if len(differing) == 1 else most.replace("=", "at most")
         found.can.append(
             f"{where}: {who} preferred {words} ({_test(options)}, p {most} after Holm's "
             "correction; "
-            f"{len(differing)} of {len(rows)} pairs)."
+            f"{_share(differing, rows)})."
         )
     for row in by["equivalent"] + by["both"]:
         a, b = codebook.label(row.a), codebook.label(row.b)
@@ -161,14 +164,15 @@ def _about_pairs(
         else:
             them = _pairs(undecided, codebook)
             if len(undecided) > MOST:
-                them = "them; the table of every pair names them"
+                them = f"them; {PAIRS} names them"
             found.cannot.append(
-                f"{where}: {len(undecided)} of {count(len(rows), 'pair')} "
-                f"{'is' if len(undecided) == 1 else 'are'} undecided: {tail} for {them}."
+                f"{where}: {_share(undecided, rows)} {'is' if len(undecided) == 1 else 'are'} "
+                f"undecided: {tail} for {them}."
             )
     alike = [row for row in undecided if np.isnan(row.tost_p)] if options.margin else []
     if alike:
-        which = "them" if len(alike) == len(undecided) > 1 else _pairs(alike, codebook)
+        which = f"each of all {len(rows)} pairs" if len(alike) == len(rows) > 1 else None
+        which = which or _pairs(alike, codebook)
         found.cannot.append(
             f"{where}: everyone gave the same answer about {which}: answers without spread allow "
             "no test of equality."
@@ -228,15 +232,27 @@ def _about_disagreements(
             "the declared test does not decide; the declared test stands."
         )
     by_model = [
-        row
-        for row in undecided
-        if row not in together and (row.a, row.b) in other and other[row.a, row.b].holm_p <= alpha
+        row for row in undecided if (row.a, row.b) in other and other[row.a, row.b].holm_p <= alpha
     ]
     if by_model:
         found.cannot.append(
             f"{where}: the contrast of the linear model, from the answers about all pairs, differs "
-            f"from 0 after Holm's correction for {_pairs(by_model, codebook)}, where the declared "
-            "test does not decide; the declared test stands."
+            f"from 0 after Holm's correction for {_pairs(by_model, codebook, CONTRASTS)}, where "
+            "the declared test does not decide; the declared test stands."
+        )
+    not_by_model = [
+        row
+        for row in rows.itertuples()
+        if verdict(row, alpha) in ("different", "both")
+        and (one := other.get((row.a, row.b))) is not None
+        and np.isfinite(one.holm_p)
+        and not (one.holm_p <= alpha and one.estimate * row.mean_preference > 0)
+    ]
+    if not_by_model:
+        found.can.append(
+            f"{where}: for {_pairs(not_by_model, codebook, CONTRASTS)} the declared test finds a "
+            "difference that the contrast of the linear model, from the answers about all pairs, "
+            "does not find after Holm's correction; the declared test stands."
         )
     against = [
         row
@@ -264,6 +280,8 @@ def _about_jod_margin(
     """Which pairs meet the margin in JOD, beside a margin in points that decides."""
     if not options.margin_jod or not options.margin:
         return
+    if rows.jod.isna().all():  # no worths, which a sentence of its own says
+        return
     margin = options.margin_jod
     meet = [row for row in rows.itertuples() if row.jod_equivalent == 1]
     inner = f"{100 * (1 - 2 * alpha):g} %"
@@ -287,10 +305,10 @@ def _about_jod_margin(
         f"{_pairs(sure, codebook) if sure else 'none'}."
     )
     if differ:
-        words += (
-            f" The declared tests in points do not call {_pairs(differ, codebook)} equal, "
-            "and they stand."
-        )
+        them = f"do not call {_pairs(differ, codebook)}"
+        if len(differ) == len(meet) > 1:
+            them = "call none of them"
+        words += f" The declared tests in points {them} equal, and they stand."
     found.cannot.append(words)
 
 
@@ -382,10 +400,17 @@ def _about_images(
         return
     hold = [row for row in table.itertuples() if row.holm_p <= alpha]
     images = int(table.images.max())
-    if hold:
+    if table.holm_p.isna().all():
+        found.cannot.append(
+            f"Whether differences hold for other images than these {images} kinds: no pair could "
+            "be tested, since its mean preference is the same at every kind or it was asked at too "
+            "few."
+        )
+    elif hold:
         found.can.append(
             f"Taking the {images} kinds of images as a sample of others (t test over them, after "
-            f"Holm's correction), differences hold beyond them for {_pairs(hold, codebook)}."
+            "Holm's correction), differences hold beyond them for "
+            f"{_pairs(hold, codebook, 'the table of kinds of images')}."
         )
     else:
         found.cannot.append(
@@ -591,9 +616,15 @@ def _equals(p: float) -> str:
     return text.replace("<", "< ").replace(">", "> ") if text[0] in "<>" else f"= {text}"
 
 
-def _pairs(rows: list, codebook: Codebook) -> str:
+def _share(some: list, rows: pd.DataFrame) -> str:
+    """'3 of 10 pairs', and where there is one alone 'the one pair'."""
+    return f"{len(some)} of {len(rows)} pairs" if len(rows) > 1 else "the one pair"
+
+
+def _pairs(rows: list, codebook: Codebook, table: str = PAIRS) -> str:
+    """The pairs by name; of more than `MOST` the number, and the table that names them."""
     if len(rows) > MOST:
-        return f"{len(rows)} pairs, which the table of every pair has"
+        return f"{len(rows)} pairs, which {table} has"
     return "; ".join(f"{codebook.label(row.a)} and {codebook.label(row.b)}" for row in rows)
 
 

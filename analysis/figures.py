@@ -220,6 +220,11 @@ def _panels(
     return figure, list(axes[:count])
 
 
+def _zero(ax: Axes) -> None:
+    """A line at 0, over the grid and under what is drawn."""
+    ax.axvline(0, color="#888888", linewidth=0.7, zorder=1.6)
+
+
 def _cut(label: str, width: int) -> str:
     """The label in so many letters: its beginning and its end, which tells one from another."""
     if len(label) <= width:
@@ -230,8 +235,11 @@ def _cut(label: str, width: int) -> str:
 
 def _wrapped(label: str, width: int = 20, most: int = 2) -> str:
     """The label on at most so many lines."""
-    lines = textwrap.wrap(label.replace("_", "_\u200b"), width, break_long_words=True) or [label]
-    lines = [line.replace("\u200b", "") for line in lines]
+    if len(label) <= width:
+        return label
+    # a vertical tab is white space to textwrap and in no label: a place to break behind '_'
+    lines = textwrap.wrap(label.replace("_", "_\v"), width, replace_whitespace=False)
+    lines = [line.replace("\v", "") for line in lines]
     if len(lines) > most:
         return _wrapped(_cut(label, most * width - most), width, most + 1)
     return "\n".join(lines)
@@ -359,7 +367,7 @@ def _total_by_distance(
     ax.grid(axis="y")
     ax.set_ylabel("points")
     ax.set_xlabel(axis)
-    ax.legend(loc="lower left", fontsize=7, handlelength=1.6)
+    ax.legend(loc="best", fontsize=7, handlelength=1.6)
     return figure
 
 
@@ -453,7 +461,7 @@ def _pair(
     values = {name: values[name] for name in chosen}
     figure, (ax,) = _panels(1, 1, 1.15 + 0.62 * len(values), NARROW_IN)
     places = range(len(values))
-    ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+    _zero(ax)
     boxes = []
     for answers in values.values():
         q1, median, q3 = grouped_quantiles(answers, (0.25, 0.5, 0.75))

@@ -85,11 +85,24 @@ def escape_label(name: str) -> str:
     return "".join(mark if mark.isalnum() else "-" for mark in name)
 
 
-def document(tables: Iterable[Shown], title: str, simulated: bool = False) -> str:
-    """All tables in one file that compiles alone."""
+def document(
+    tables: Iterable[Shown],
+    title: str,
+    simulated: bool = False,
+    notes: Iterable[tuple[str, Iterable[str]]] = (),
+) -> str:
+    """All tables in one file that compiles alone, and after them what is said of them: notes,
+    (topic, sentences).
+    """
     size = [r"\footnotesize" + "\n", rf"\section*{{{escape(title)}}}" + "\n"]
     if simulated:
         size.append(rf"\noindent\textbf{{{SIMULATED}}}: every answer was made by a program." + "\n")
+    said = [
+        rf"\noindent\textbf{{{escape(topic)}.}} {escape(' '.join(sentences))}\par"
+        for topic, sentences in notes
+    ]
     return "\n".join(
-        [PREAMBLE, *size, *(table(one, simulated) for one in tables), r"\end{document}", ""]
+        [PREAMBLE, *size, *(table(one, simulated) for one in tables)]
+        + ([r"\section*{Notes to the tables}", *said] if said else [])
+        + [r"\end{document}", ""]
     )

@@ -11,7 +11,7 @@ from importlib import metadata
 
 from analysis.agreement import rules_in_words
 from analysis.codebook import FRAMING
-from analysis.conclusions import count
+from analysis.conclusions import MODEL_NAMES, count
 from analysis.inference import alpha_of
 from analysis.options import Options
 from analysis.responses import Responses
@@ -201,7 +201,8 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             f"(by adaptive Gauss-Hermite quadrature for up to {QUADRATURE_ITEMS} techniques "
             f"and at most {FEW_ANSWERS} answers a person; without "
             f"random effects where nobody gave more than {NO_TASTE} answers). "
-            f"Models fitted: {', '.join(options.models)}. All are maximum likelihood where it "
+            f"Models fitted: {', '.join(MODEL_NAMES[name] for name in options.models)}. All are "
+            "maximum likelihood where it "
             "has a finite maximum under this handling of ties; "
             + (
                 "where it has none (a technique that never wins, or never loses), fits with "
@@ -258,7 +259,8 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             )
             + (
                 "Familiarity was set against each person's preference for a technique by "
-                "Spearman's correlation, Holm-corrected."
+                "Spearman's correlation, and how often each technique stood on the left was tested "
+                "by the binomial; both are Holm-corrected over the same family as the pairs."
             ),
         ),
         (

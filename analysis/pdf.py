@@ -22,11 +22,9 @@ from analysis.figures import DOUBLE_MM, SIMULATED, Picture
 from analysis.shown import Shown
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.typ"
-#: Width of the text on the page, mm, no less than the widest figure, so that no letter shrinks; its
-#: height; and the gap between two figures beside each other.
-TEXT_MM, PAGE_MM, GAP_MM = 178, 257, 4
-#: A caption: letters on a line of the whole width, height of a line, room about a figure, mm.
-LETTERS, LINE_MM, ROOM_MM = 118, 4.2, 7.0
+#: Width of the text on the page, mm, no less than the widest figure, so that no letter shrinks; and
+#: the gap between two figures beside each other.
+TEXT_MM, GAP_MM = 178, 4
 #: Tables with more columns are set across.
 MOST_COLUMNS = 9
 
@@ -37,11 +35,12 @@ def make(
     summary: Sequence[tuple[str, Sequence[str]]],
     pictures: Sequence[Picture],
     tables: Sequence[Shown],
+    notes: Sequence[tuple[str, Sequence[str]]],
     methods: Sequence[tuple[str, str]],
     references: Sequence[str],
     simulated: bool,
 ) -> bytes:
-    """The PDF. summary and methods: (heading, sentences) and (heading, text)."""
+    """The PDF. summary and notes: (heading, sentences); methods: (heading, text)."""
     with tempfile.TemporaryDirectory(prefix="subdermal-") as folder:
         root = Path(folder)
         places = {picture.name: place for place, picture in enumerate(pictures)}
@@ -56,24 +55,22 @@ def make(
                 for heading, sentences in summary
                 if sentences
             ],
-            "pages": [
+            "rows": [
                 [
-                    [
-                        {
-                            "file": f"{places[picture.name]}.svg",
-                            "title": picture.title,
-                            "caption": picture.caption,
-                            "alt": picture.alt,
-                            "width_mm": min(TEXT_MM, _size_mm(picture.svg)[0]),
-                        }
-                        for picture in row
-                    ]
-                    for row in page
+                    {
+                        "file": f"{places[picture.name]}.svg",
+                        "title": picture.title,
+                        "caption": picture.caption,
+                        "alt": picture.alt,
+                        "width_mm": min(TEXT_MM, _size_mm(picture.svg)[0]),
+                    }
+                    for picture in row
                 ]
-                for page in packed(pictures)
+                for row in rows(pictures)
             ],
             "most_columns": MOST_COLUMNS,
             "tables": [asdict(one) for one in tables],
+            "notes": [{"heading": heading, "sentences": list(lines)} for heading, lines in notes],
             "methods": [{"heading": heading, "text": text} for heading, text in methods],
             "references": list(references),
         }
@@ -85,39 +82,21 @@ def make(
         )
 
 
-def packed(pictures: Sequence[Picture]) -> list[list[list[Picture]]]:
-    """Pages of rows of figures: two narrow ones beside each other, each row on the first page that
-    has room for it, so that no page is left half empty before a tall figure.
+def rows(pictures: Sequence[Picture]) -> list[list[Picture]]:
+    """Rows of figures: two narrow ones beside each other. report.typ puts each on the first page
+    that has room for it, so that no page is left half empty before a tall figure.
     """
-    rows: list[list[Picture]] = []
-    alone: list[Picture] | None = None
+    found: list[list[Picture]] = []
+    single: list[Picture] | None = None
     for picture in pictures:
         narrow = 2 * _size_mm(picture.svg)[0] + GAP_MM <= TEXT_MM
-        if narrow and alone is not None:
-            alone.append(picture)
-            alone = None
+        if narrow and single is not None:
+            single.append(picture)
+            single = None
             continue
-        row = [picture]
-        rows.append(row)
-        alone = row if narrow else alone
-    pages: list[tuple[float, list[list[Picture]]]] = []
-    for row in rows:
-        height = max(_height_mm(picture, len(row)) for picture in row)
-        for place, (used, page) in enumerate(pages):
-            if used + height <= PAGE_MM:
-                pages[place] = used + height, [*page, row]
-                break
-        else:
-            pages.append((height, [row]))
-    return [page for _, page in pages]
-
-
-def _height_mm(picture: Picture, beside: int) -> float:
-    """The height of a figure with its caption, where so many stand in its row."""
-    width, height = _size_mm(picture.svg)
-    letters = LETTERS / beside
-    lines = -(-len(f"Figure 10: {picture.title}. {picture.caption}") // letters)
-    return height * min(1.0, TEXT_MM / width) + lines * LINE_MM + ROOM_MM
+        found.append([picture])
+        single = found[-1] if narrow else single
+    return found
 
 
 def _size_mm(svg: bytes) -> tuple[float, float]:

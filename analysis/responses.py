@@ -471,7 +471,8 @@ def _grouping(frame: pd.DataFrame, codebook: Codebook) -> Iterable[str]:
             "resample participants with all of their answers; counts, medians, worths and "
             "AHP take every answer."
         )
-    if len(held) > 1 and "framing" not in questions(frame, codebook):
+    apart = codebook.factor != FRAMING and len(held) > 1
+    if apart and "framing" not in questions(frame, codebook):
         yield (
             f"Nobody judged the same images at several {codebook.levels}: taken together, the "
             "answers are those of the study without "

@@ -285,8 +285,9 @@ def goodness(table: pd.DataFrame, codebook: Codebook) -> Shown:
         ),
         (False, False, *[True] * 5),
         tuple(rows),
-        "Deviance from a number of its own for each pair, by chi-square; answers are taken as "
-        "independent, which those of one person are not, and ties as half wins make it small.",
+        "Deviance from the saturated model, which has parameters of its own for each pair, against "
+        "chi-square; answers are taken as independent, which those of one person are not, and ties "
+        "as half wins make it small.",
     )
 
 
@@ -339,7 +340,7 @@ def models(table: pd.DataFrame, codebook: Codebook) -> Shown:
         (codebook.heading, "Parameter", "Estimate"),
         (False, False, True),
         tuple(rows),
-        "Spreads are standard deviations over people, without intervals.",
+        "Spreads are standard deviations over people; they and thresholds have no intervals.",
     )
 
 

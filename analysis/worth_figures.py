@@ -125,7 +125,7 @@ def _worths(framings: list[str], worths: pd.DataFrame, codebook: Codebook) -> Fi
             here = worths[(worths.framing == framing) & (worths.model == model)].set_index(
                 "technique"
             )
-            ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+            figures._zero(ax)
             for place, technique in enumerate(techniques):
                 if technique in here.index:
                     one = here.loc[technique]
@@ -259,7 +259,7 @@ def draw_ladder(
 
 def rungs(ax: Axes, labels: list[str]) -> None:
     """A ladder's axes: a rung a label, the first on top, and a line at 0."""
-    ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+    figures._zero(ax)
     labels = [figures._cut(label, 22) for label in labels]
     ax.set_yticks(range(len(labels)), labels, size=7.5)
     ax.set_ylim(len(labels) - 0.5, -0.5)
@@ -527,7 +527,7 @@ def _scores(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Fig
         ax.set_title(figures._wrapped(codebook.framing_label(framing), 28), loc="left", size=8)
         ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
-        ax.set_xlim(left=0)
+        ax.set_xlim(0, max(1, ax.get_xlim()[1]))
         ax.xaxis.set_major_locator(MaxNLocator(4, integer=True))
         ax.tick_params(labelbottom=True)
         ax.grid(axis="x")
@@ -571,7 +571,7 @@ def _agreement(statistics: list[str], found: pd.DataFrame, codebook: Codebook) -
     for ax, statistic in zip(panels, statistics, strict=True):
         for row in found[found.statistic == statistic].itertuples():
             _interval(ax, row.value, row.low, row.high, framings.index(row.framing))
-        ax.axvline(0, color="#888888", linewidth=0.7, zorder=0)
+        figures._zero(ax)
         ax.set_title(figures._wrapped(DRAWN[statistic], 30), loc="left", size=8)
         ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
@@ -591,7 +591,7 @@ def draw_triads(participants: pd.DataFrame, simulated: bool = False) -> Picture 
         "How consistent and how fast each person was",
         "One dot a person: the coefficient of consistency (1: no circular triad) and the "
         "median time of an answer. "
-        "Crosses: those whom a declared rule excludes in the second pass.",
+        "Crosses: those whom a rule excludes in the second pass.",
         f"{len(participants)} people; consistency from {zeta.min():.2f} to {zeta.max():.2f}, "
         f"median {zeta.median():.2f}",
         _participants,

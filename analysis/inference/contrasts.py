@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.inference.people import holm
-from analysis.options import FEWEST_PEOPLE, OVERALL, Options
+from analysis.inference.people import holm_in_families
+from analysis.options import FEWEST_PEOPLE, Options
 from analysis.panel import Panel, panels, with_notes
 from analysis.responses import Responses
 
@@ -56,10 +56,7 @@ def contrasts(responses: Responses, options: Options) -> pd.DataFrame:
             for k, (i, j) in enumerate(chosen)
         ]
     table = with_notes(rows, ["framing", "a", "b", "estimate", "low", "high", "p", "holm_p"], notes)
-    family = (table.framing == OVERALL) if options.family == "study" else table.framing
-    for one in pd.unique(family):
-        members = family == one
-        table.loc[members, "holm_p"] = holm(table.loc[members, "p"].to_numpy(float))
+    table["holm_p"] = holm_in_families(table, options)
     return table
 
 

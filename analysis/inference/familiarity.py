@@ -7,7 +7,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis import bootstrap
-from analysis.inference.people import holm
+from analysis.inference.people import holm_in_families
 from analysis.options import FEWEST_PEOPLE, OVERALL, Options
 from analysis.panel import Panel, panels, with_notes
 from analysis.responses import Responses
@@ -23,12 +23,13 @@ def familiarity_interaction(responses: Responses, options: Options) -> pd.DataFr
     slope       of a participant's net score for the technique (points for it less points against
                 it, an answer, -2 to 2) a level
     spearman    their rank correlation, p by permuting familiarity over people; Holm over the
-                techniques of a framing
+                techniques of the declared family
     detectable  the correlation that a study of n people finds with a power of 0.8 at this level,
                 one test (Fisher's z with the variance 1.06/(n - 3) of Fieller, Hartley and Pearson
                 1957); smaller ones were not ruled out
-    Of a framing those count who judged every technique. technique '' tests all techniques of the
-    framing at once: the sum of squared rank correlations, by the same permutations
+    Where all net scores for a technique are alike there is no correlation and no p. Of a framing
+    those count who judged every technique. technique '' tests all techniques of the framing at
+    once: the sum of squared rank correlations, by the same permutations
     """
     columns = [
         "framing",
@@ -68,12 +69,20 @@ def familiarity_interaction(responses: Responses, options: Options) -> pd.DataFr
         together = (1 + ((null**2).sum(axis=1) >= (rho**2).sum() - 1e-9).sum()) / (
             1 + options.resamples
         )
+        same = np.ptp(y, axis=0) < 1e-9
+        if same.any():
+            rho[same] = p[same] = np.nan
+            together = np.nan if same.all() else together
+            items = "every technique" if same.all() else ", ".join(np.array(panel.items)[same])
+            notes.append(
+                f"{name}: everybody's net score is the same for {items}: no correlation with "
+                "familiarity"
+            )
         slope, low, high = _slopes(x, y, options)
         found = _detectable(len(x), 1 - options.level)
         rows.append((name, "", len(x), np.nan, np.nan, np.nan, np.nan, together, np.nan, found))
-        adjusted = holm(p)
         rows += [
-            (name, item, len(x), slope[k], low[k], high[k], rho[k], p[k], adjusted[k], found)
+            (name, item, len(x), slope[k], low[k], high[k], rho[k], p[k], np.nan, found)
             for k, item in enumerate(panel.items)
         ]
         if name == OVERALL or len(panels(responses)) == 1:
@@ -84,7 +93,10 @@ def familiarity_interaction(responses: Responses, options: Options) -> pd.DataFr
                 f"{_power(0.5, len(x), 1 - options.level):.2f}; "
                 f"what is missing a small p is not shown to be absent"
             )
-    return with_notes(rows, columns, notes)
+    table = with_notes(rows, columns, notes)
+    single = table.assign(p=table.p.where(table.technique != ""))
+    table["holm_p"] = holm_in_families(single, options)
+    return table
 
 
 def net_scores(panel: Panel) -> tuple[np.ndarray, np.ndarray]:

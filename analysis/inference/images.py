@@ -35,7 +35,8 @@ def by_images(responses: Responses, options: Options) -> pd.DataFrame:
     parts = list(panels(responses).values())[-1].parts
     if len(parts) < FEWEST_IMAGES:
         note = (
-            f"{len(parts)} kinds of images: nothing is said of others, which needs {FEWEST_IMAGES}"
+            f"nothing is said of other images, which needs {FEWEST_IMAGES} kinds of images: there "
+            f"{'is' if len(parts) == 1 else 'are'} {len(parts)}"
         )
         return with_notes([], columns, [note])
     means: dict[tuple[str, str], list[float]] = {}

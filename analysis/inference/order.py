@@ -42,7 +42,10 @@ def order_effects(responses: Responses, options: Options) -> pd.DataFrame:
     rows, notes = [], []
     for name, one in values.items():
         if len(one) < FEWEST_PEOPLE:
-            notes.append(f"{name}: {len(one)} participants, expected {FEWEST_PEOPLE}")
+            notes.append(
+                f"{name}: {len(one)} participants answered what tells it, which {FEWEST_PEOPLE} "
+                "have to"
+            )
             continue
         draws = bootstrap.totals(one, options) / len(one)
         low, high = bootstrap.interval(draws, len(one), options.level)

@@ -17,7 +17,7 @@ from analysis.inference.people import (
     decided,
     equivalence,
     equivalent,
-    holm,
+    holm_in_families,
     sign_test,
     signed_rank,
     within,
@@ -77,15 +77,15 @@ def pairs(responses: Responses, options: Options) -> pd.DataFrame:
         else f"the pairs of a {codebook.level}"
     )
     notes.append(
-        f"holm_p is Holm's over {scope}, of the {options.test} test; 'overall' is a family of "
-        "its own"
+        f"holm_p is Holm's over {scope}, of the {options.test} test; all {codebook.levels} taken "
+        "together are a family of their own"
     )
     table = with_notes(rows, PAIRS, notes)
+    table["holm_p"] = holm_in_families(table, options, f"{options.test}_p")
+    table["tost_holm_p"] = holm_in_families(table, options, "tost_p")
     family = (table.framing == OVERALL) if options.family == "study" else table.framing
     for one in pd.unique(family):
         members = family == one
-        table.loc[members, "holm_p"] = holm(table.loc[members, f"{options.test}_p"].to_numpy())
-        table.loc[members, "tost_holm_p"] = holm(table.loc[members, "tost_p"].to_numpy())
         for value, bounds, kind in (
             ("mean_preference", "simultaneous", "mean"),
             ("jod", "jod_simultaneous", "jod"),

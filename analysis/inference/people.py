@@ -9,9 +9,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import pandas as pd
 from scipy import stats
 
-from analysis.options import FEWEST_PEOPLE, Options
+from analysis.options import FEWEST_PEOPLE, OVERALL, Options
 
 #: To this number of people who saw a difference the signed-rank test is exact.
 EXACT_PEOPLE = 50
@@ -158,6 +159,18 @@ def holm(p: np.ndarray) -> np.ndarray:
     result = np.empty_like(rows)
     np.put_along_axis(result, order, np.where(np.isnan(ascending), np.nan, adjusted), axis=1)
     return result.reshape(p.shape)
+
+
+def holm_in_families(table: pd.DataFrame, options: Options, column: str = "p") -> np.ndarray:
+    """(rows,) Holm's p of a column of p, over the declared family: all rows of all framings, or
+    those of one; the rows of all framings together are a family of their own.
+    """
+    family = (table.framing == OVERALL) if options.family == "study" else table.framing
+    p, adjusted = table[column].to_numpy(float), np.full(len(table), np.nan)
+    for one in pd.unique(family):
+        members = (family == one).to_numpy()
+        adjusted[members] = holm(p[members])
+    return adjusted
 
 
 def declared_p(counts: np.ndarray, options: Options) -> np.ndarray:

@@ -33,7 +33,9 @@ def trend(responses: Responses, options: Options) -> pd.DataFrame:
         return with_notes([], columns, [f"{responses.codebook.levels} are no distances: no trend"])
     here = list(panels(responses, overall=False).values())
     if len(here) < 3:
-        return with_notes([], columns, [f"{len(here)} framings: a trend over distance needs 3"])
+        return with_notes(
+            [], columns, [f"a trend over distance needs 3 framings, and the table has {len(here)}"]
+        )
     notes = bootstrap.few(responses)
     if not responses.codebook.near_to_far:
         notes.append(f"distance is the order of framings: {responses.codebook.framing_rule}")

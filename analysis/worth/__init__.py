@@ -182,7 +182,9 @@ def goodness(responses: Responses, options: Options) -> pd.DataFrame:
                     rows.append((name, model, one.parameters, likelihood, np.nan, np.nan, np.nan))
                 continue
             if missing_fit(panel, model, options.ties):
-                notes.append(f"{name}, {model}: no deviance: the fit is not maximum likelihood")
+                no_fit = impossible(panel, model) or options.fallback == "none"
+                reason = "there is no fit" if no_fit else "the fit is not maximum likelihood"
+                notes.append(f"{name}, {model}: no deviance: {reason}")
                 continue
             rows.append((name, model, *_deviance(panel, model, options)))
     columns = ["framing", "model", "parameters", "log_likelihood", "deviance", "df", "p"]
@@ -268,10 +270,10 @@ def fit(panel: Panel, model: str, options: Options) -> Fit:
     elif without and options.fallback == "none":
         enough = np.isfinite(low).all()
         kept = "they are left out of the interval" if enough else "too many for an interval"
-        notes.append(f"{without} of {options.resamples} resamples have no finite worths; {kept}")
+        notes.append(f"no finite worths in {without} of {options.resamples} resamples; {kept}")
     elif without:
         notes.append(
-            f"{without} of {options.resamples} resamples have no finite maximum: the interval is "
+            f"no finite maximum in {without} of {options.resamples} resamples: the interval is "
             "that of worths with reduced bias"
         )
     spread = wald_covariance(panel, model, options)
@@ -376,12 +378,12 @@ def _caveats(panel: Panel, one: Ordinal) -> list[str]:
     most = answers_each(panel)
     if most <= NO_TASTE:
         return [
-            f"at most {most} answers a participant: tastes of their own cannot be told from "
+            f"nobody gave more than {most} answers: tastes of their own cannot be told from "
             "noise and are not in the model"
         ]
     if most <= FEW_ANSWERS and len(panel.items) > QUADRATURE_ITEMS and one.sd_preference > 0.5:
         return [
-            f"at most {most} answers a participant and tastes that differ: Laplace's "
+            f"nobody gave more than {most} answers, and tastes differ: Laplace's "
             "approximation makes worths a few per cent small"
         ]
     return []

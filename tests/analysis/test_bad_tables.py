@@ -16,10 +16,17 @@ from analysis.options import Options
 from analysis.report import report_responses
 
 
+def text_of(html):
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", html)).split())
+
+
 def in_short(files):
     page = files["report.html"].decode()
-    part = page[page.index("<h2>In short") : page.index("</section>")]
-    return " ".join(unescape(re.sub(r"<[^>]+>", " ", part)).split())
+    return text_of(page[page.index("<h2>In short") : page.index("</section>")])
+
+
+def whole(files):
+    return text_of(files["report.html"].decode())
 
 
 def worths(files):
@@ -69,18 +76,35 @@ def test_fewer_people_than_a_test_needs(report):
 
 
 def test_one_pair(report):
-    text = in_short(report(8, ["a", "b"], any_answer))
-    assert "1 of 1 pair is undecided" in text
+    files = report(8, ["a", "b"], any_answer)
+    text = in_short(files)
+    assert "close-up: the one pair is undecided" in text
+    agreement = pd.read_csv(io.BytesIO(files["tables/agreement.csv"])).set_index("statistic").value
+    assert np.isnan(agreement["krippendorff_alpha"])  # 0 by definition, whatever was answered
+    assert "Krippendorff's alpha has no number for one pair alone" in text_of(
+        files["report.html"].decode()
+    )
 
 
 def test_only_ties_have_no_worths_and_no_winner(report):
-    files = report(8, ["a", "b", "c"], lambda *_: 0)
+    framings = ("close-up", "head-shot", "half-length")
+    files = report(8, ["a", "b", "c"], lambda *_: 0, framings=framings)
     text = in_short(files)
-    assert (
-        "every answer is 'no difference'" in text
-        and "preferred" not in text.split("What was counted")[0]
-    )
+    concluded = text.split("What was counted")[0]
+    assert "every answer is 'no difference'" in text and "preferred over" not in concluded
+    assert "everyone gave the same answer about each of all 3 pairs" in concluded
+    assert "0.5 JOD" not in concluded  # there is no JOD to set a margin against
+    assert "familiarity" not in concluded  # nor a correlation of what never varies
+    assert "no pair could be tested, since its mean preference is the same" in concluded
+    assert "preferences do not change: on average an answer gave 0.00" in text
     assert worths(files).estimate.isna().all() and "figures/jod_ladder.svg" not in files
+    table = pd.read_csv(io.BytesIO(files["tables/familiarity_interaction.csv"]))
+    assert (
+        table.spearman.isna().all() and table.p.isna().all() and (table.slope.dropna() == 0).all()
+    )
+    page = whole(files)
+    assert "everybody's net score is the same for every technique" in page
+    assert "no deviance: there is no fit" in page and "not maximum likelihood" not in page
 
 
 def test_no_ties_at_all(report):

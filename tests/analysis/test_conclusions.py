@@ -142,7 +142,7 @@ def test_a_preference_for_the_second_turns_the_sentence():
         Options(margin=0.25, test="sign"),
     )
     assert (
-        "people preferred b over Ay (sign test, p < 0.001 after Holm's correction; 1 of 1 pairs)"
+        "people preferred b over Ay (sign test, p < 0.001 after Holm's correction; the one pair)"
         in can
     )
 
@@ -220,6 +220,25 @@ def test_exclusions_say_what_hangs_on_them(excluded, changed, where, words):
         sensitivity=pd.DataFrame({"changed": np.array(changed, int)}),
     )
     assert words in said(found, people=2)[where]
+
+
+def test_contrasts_that_differ_from_the_declared_test_are_all_named():
+    """Every undecided pair whose contrast differs, also one that another sentence names already;
+    and every pair that is found different where the contrast is not, or points the other way.
+    """
+    spread = {"simultaneous_low": 0.1, "simultaneous_high": 0.9}
+    contrasts = pd.DataFrame(
+        [("a", "b", 0.4, 0.001), ("a", "c", 0.4, 0.002), ("b", "c", 0.1, 0.4)],
+        columns=["a", "b", "estimate", "holm_p"],
+    ).assign(framing="close-up")
+    found = tables(pair("a", "b", **spread), pair("a", "c"), pair("b", "c"), contrasts=contrasts)
+    _, cannot = said(found)
+    assert "an adjusted interval" in cannot and "excludes 0 for Ay and b, where" in cannot
+    assert "differs from 0 after Holm's correction for Ay and b; Ay and c, where" in cannot
+    different = {"holm_p": 0.01, "mean_preference": -0.4}
+    rows = pair("a", "b", **different), pair("b", "c", **different)
+    can, _ = said(tables(*rows, contrasts=contrasts))
+    assert "for Ay and b; b and c the declared test finds a difference that the contrast" in can
 
 
 def test_fits_that_do_not_exist_are_named_once_with_labels():

@@ -116,6 +116,7 @@ def test_long_names_are_wrapped_and_cut():
     assert _wrapped("jimenez_separable") == "jimenez_separable"
     lines = _wrapped("a_rather_long_technique_name with words and more words").split("\n")
     assert len(lines) <= 3 and all(len(line) <= 21 for line in lines) and "…" in "".join(lines)
+    assert _wrapped("golubev_plus", 11) == "golubev_\nplus"
     assert _wrapped("x" * 90).count("\n") <= 2
     # two that differ at their ends alone stay told apart
     names = [_cut(f"a_rather_long_technique_name_{k}", 16) for k in (1, 2)]

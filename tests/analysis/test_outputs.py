@@ -27,7 +27,7 @@ from analysis import (
     worth_figures,
 )
 from analysis.codebook import Codebook
-from analysis.figures import DOUBLE_MM, SIMULATED, SINGLE_MM
+from analysis.figures import DOUBLE_MM, SIMULATED, SINGLE_MM, Picture
 from analysis.options import Options
 from analysis.shown import Shown
 
@@ -151,6 +151,7 @@ def text_of(report, option):
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no poppler here")
 def test_the_pdf_says_what_the_page_says(study_report):
     for simulated, files in study_report.items():
+        assert rb"\section*{Notes to the tables}" in files["report.tex"]
         text = text_of(files["report.pdf"], "-layout")
         pages = text.split("\f")[:-1]
         assert all((SIMULATED in page) == simulated for page in pages) and len(pages) > 5
@@ -158,6 +159,8 @@ def test_the_pdf_says_what_the_page_says(study_report):
         for part in (
             "What can be concluded",
             "What cannot be concluded",
+            "Notes to the tables",
+            "Close-up, head-shot, half-length and All framings: no question was asked again",
             "Methods",
             "References",
             "TOST Holm p",
@@ -173,11 +176,37 @@ def test_typst_markup_in_a_name_stays_text():
         [("h", ['#read("/etc/passwd")'])],
         [],
         [table],
+        [("#h", ["$n$"])],
         [("h", "@x")],
         ["<r>"],
         True,
     )
     assert content.startswith(b"%PDF")
+
+
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no poppler here")
+def test_no_page_is_left_half_empty_and_no_caption_without_its_table():
+    """A low figure, one as tall as a page and two low ones, then a table, behind some text."""
+
+    def picture(name, height_mm):
+        size = f'width="{178 * 72 / 25.4}pt" height="{height_mm * 72 / 25.4}pt"'
+        svg = f'<svg xmlns="http://www.w3.org/2000/svg" {size}/>'.encode()
+        return Picture(name, f"picture {name}", "Caption.", "", svg, b"", b"")
+
+    pictures = [picture("1", 60), picture("2", 220), picture("3", 50), picture("4", 30)]
+    table = Shown("x", "Heading", ("A", "B"), (False, True), (("first", "1"), ("second", "2")))
+    for lines in (4, 20, 21, 34, 35, 36, 37):
+        summary = [("h", ["one line of text"] * lines)]
+        made = pdf.make("t", "s", summary, pictures, [table], [], [], [], False)
+        pages = text_of(made, "-layout").split("\f")[:-1]
+        where = {
+            words: next(k for k, page in enumerate(pages) if words in page)
+            for words in ("Figures", *(f"picture {k}" for k in "1234"), "Heading", "first")
+        }
+        assert where["Heading"] == where["first"] and where["Figures"] == where["picture 1"]
+        if lines == 4:  # the first page has room for all three that are low
+            assert where["picture 1"] == where["picture 3"] == where["picture 4"] == 0
+        assert where["first"] <= 2, (lines, where)
 
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no poppler here")
@@ -187,7 +216,7 @@ def test_long_names_stay_in_their_columns():
     rows = tuple((name.format(k), name.format(f"{k}0"), *("0.50 [0.10, 0.90]",) * 4) for k in "123")
     columns = ("A", "B", "Rank-biserial", "Standardised mean", "Contrast, points", "Holm p")
     table = Shown("x", "", columns, (False, False, True, True, True, True), rows)
-    found = text_of(pdf.make("t", "= x", [], [], [table], [], [], False), "-bbox")
+    found = text_of(pdf.make("t", "= x", [], [], [table], [], [], [], False), "-bbox")
     box = r'xMin="([\d.]+)" yMin="([\d.]+)" xMax="([\d.]+)"'
     lines: dict[str, list[tuple[float, float]]] = {}
     for left, top, right in re.findall(box, found):

@@ -271,7 +271,7 @@ def test_people_with_tastes_are_found_and_widen_the_interval(crowd):
 
 def test_one_answer_a_person_has_no_taste_and_six_have_a_caveat(crowd, table):
     notes = worths(table(crowd(40, [0, 0.5], seed=1)), Options(resamples=100)).attrs["notes"]
-    assert any("at most 1 answers a participant" in note for note in notes)
+    assert any("nobody gave more than 1 answers" in note for note in notes)
     notes = worths(
         table(crowd(80, [0, 0.5, 0.2, 0.1], seed=1, taste=2.0)), Options(resamples=100)
     ).attrs["notes"]
@@ -556,7 +556,7 @@ def test_intervals_survive_resamples_without_a_fit(lines):
     assert (found.low > -6).all() and (found.high < 6).all()
     assert set(found.fit) == {"maximum likelihood"}
     assert any(
-        "resamples have no finite maximum: the interval is that of worths with reduced bias" in note
+        "resamples: the interval is that of worths with reduced bias" in note
         for note in found.attrs["notes"]
     )
     refused = worths(responses, Options(resamples=200, models=("bradley_terry",), fallback="none"))
