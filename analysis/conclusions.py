@@ -104,7 +104,12 @@ def _about_pairs(
             over.setdefault(winner, []).append(loser)
         order = sorted(over, key=lambda name: (-len(over[name]), codebook.techniques.index(name)))
         words = "; ".join(
-            f"{codebook.label(name)} over {listed([codebook.label(one) for one in over[name]])}"
+            f"{codebook.label(name)} over "
+            + (
+                listed([codebook.label(one) for one in over[name]])
+                if len(over[name]) <= MOST
+                else f"{len(over[name])} others"
+            )
             for name in order
         )
         most = _equals(max(row.holm_p for row in differing))
@@ -297,18 +302,22 @@ def _about_jod_margin(
         if -margin < row.jod_simultaneous_low and row.jod_simultaneous_high < margin
     ]
     differ = [row for row in meet if verdict(row, alpha) not in ("equivalent", "both")]
+    file = "tables/pairs.csv"
+    named = f": {_pairs(meet, codebook)}" if len(meet) <= MOST else f" ({file} has them)"
     words = (
         f"{where}: {count(len(meet), 'pair')} of {len(rows)} "
         f"{'meets' if len(meet) == 1 else 'meet'} the declared margin of {margin:g} JOD by "
         f"the {inner} interval of the JOD difference, which is not adjusted for the number of "
-        f"pairs: {_pairs(meet, codebook)}; adjusted for all pairs, "
-        f"{_pairs(sure, codebook) if sure else 'none'}."
+        f"pairs{named}; adjusted for all pairs, "
+        f"{_pairs(sure, codebook, file) if sure else 'none'}."
     )
     if differ:
-        them = f"do not call {_pairs(differ, codebook)}"
+        them = f"do not call {_pairs(differ, codebook)} equal"
         if len(differ) == len(meet) > 1:
-            them = "call none of them"
-        words += f" The declared tests in points {them} equal, and they stand."
+            them = "call none of them equal"
+        elif len(differ) > MOST:
+            them = f"do not call {len(differ)} of them equal"
+        words += f" The declared tests in points {them}, and they stand."
     found.cannot.append(words)
 
 

@@ -241,6 +241,20 @@ def test_contrasts_that_differ_from_the_declared_test_are_all_named():
     assert "for Ay and b; b and c the declared test finds a difference that the contrast" in can
 
 
+def test_many_pairs_are_counted_and_not_listed():
+    book = Codebook(("close-up",), tuple("abcdefghijkl"), "", "")
+    meets = {"jod": 0.1, "jod_equivalent": 1.0, "jod_simultaneous_low": -1.0}
+    lost = {"holm_p": 0.001, "mean_preference": -1.0, "jod_equivalent": 0.0}
+    rows = [pair("a", other, **lost) for other in "bcdefghijk"]
+    rows += [pair("l", other, **meets) for other in "bcdefghij"]
+    options = Options(margin=0.25, margin_jod=0.5)
+    found = conclude(tables(*rows), {}, book, options, 20, False)
+    assert any("people preferred a over 10 others (" in one for one in found.can)
+    (words,) = (one for one in found.cannot if "0.5 JOD" in one)
+    assert "9 pairs of 19 meet" in words and "(tables/pairs.csv has them); adjusted" in words
+    assert words.endswith("The declared tests in points call none of them equal, and they stand.")
+
+
 def test_fits_that_do_not_exist_are_named_once_with_labels():
     notes = [
         f"close-up, {model}: no finite worths: a was never beaten by b"
