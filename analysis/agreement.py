@@ -99,7 +99,7 @@ def agreement(responses: Responses, options: Options) -> pd.DataFrame:
     """
     rows, notes = [], bootstrap.few(responses)
     for name, panel in panels(responses).items():
-        found = [
+        triads = [
             *_consistency(name, panel.parts, options, notes),
             *([] if name == OVERALL else _pooled(panel)),
             *_concordance(name, panel, options, notes),
@@ -107,7 +107,7 @@ def agreement(responses: Responses, options: Options) -> pd.DataFrame:
             *_repeats(name, responses, panel, options, notes),
             *_times(name, responses, panel, options),
         ]
-        rows += [(name, *one) for one in found]
+        rows += [(name, *one) for one in triads]
     return with_notes(rows, ["framing", "statistic", "value", "low", "high", "p"], notes)
 
 

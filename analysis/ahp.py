@@ -184,11 +184,11 @@ def priorities_table(comparisons: Mapping[str, Comparison]) -> pd.DataFrame:
         if comparison.missing:
             rows += [(framing, name, np.nan, np.nan, np.nan, np.nan) for name in comparison.items]
             continue
-        found = priorities(comparison.matrix)
-        cr = np.nan if found.cr is None else found.cr
+        result = priorities(comparison.matrix)
+        cr = np.nan if result.cr is None else result.cr
         rows += [
-            (framing, name, priority, found.lambda_max, found.ci, cr)
-            for name, priority in zip(comparison.items, found.vector, strict=True)
+            (framing, name, priority, result.lambda_max, result.ci, cr)
+            for name, priority in zip(comparison.items, result.vector, strict=True)
         ]
     return pd.DataFrame(
         rows, columns=["framing", "technique", "priority", "lambda_max", "ci", "cr"]

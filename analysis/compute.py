@@ -124,7 +124,7 @@ def everything(
     tables = {name: TABLES[name](responses, options) for name in progress(list(TABLES))}
     notes = {name: table.attrs.get("notes", ()) for name, table in tables.items()}
     lines = [("all", line) for line in responses.grouping] + [
-        (name, line) for name, said in notes.items() for line in said
+        (name, line) for name, remarks in notes.items() for line in remarks
     ]
     return Results(
         tables | {"notes": pd.DataFrame(lines, columns=["table", "note"])}, notes, options

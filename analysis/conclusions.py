@@ -50,41 +50,43 @@ def conclude(
     simulated: bool,
 ) -> Conclusions:
     """The sentences of a report, in the order in which they are to be read."""
-    found, who = Conclusions(), "simulated participants" if simulated else "people"
+    conclusions, who = Conclusions(), "simulated participants" if simulated else "people"
     alpha = alpha_of(options)
     pairs = tables["pairs"]
     for framing, rows in pairs[pairs.framing != OVERALL].groupby("framing", sort=False):
         where = framing_label(codebook, framing)
-        _about_pairs(found, where, rows, codebook, options, alpha, who)
-        _about_disagreements(found, where, rows, _of(tables, "contrasts", framing), codebook, alpha)
-        _about_jod_margin(found, where, rows, codebook, options, alpha)
-    _about_interaction(found, tables, codebook, alpha)
+        _about_pairs(conclusions, where, rows, codebook, options, alpha, who)
+        _about_disagreements(
+            conclusions, where, rows, _of(tables, "contrasts", framing), codebook, alpha
+        )
+        _about_jod_margin(conclusions, where, rows, codebook, options, alpha)
+    _about_interaction(conclusions, tables, codebook, alpha)
     if not (options.margin or options.margin_jod):
-        found.cannot.append(
+        conclusions.cannot.append(
             "No margin of equivalence was declared before the data, so that no two "
             "techniques can be called as good as each other; "
             "that a test finds no difference does not make them equal."
         )
-    _about_trend(found, tables["trend"], codebook, alpha)
-    _about_order(found, tables, alpha)
-    _about_images(found, tables, codebook, alpha)
-    _about_agreement(found, tables["agreement"], codebook, alpha, who.capitalize())
-    _about_sides(found, tables, notes, codebook, alpha, who.capitalize())
-    _about_familiarity(found, tables["familiarity_interaction"], codebook, alpha)
-    _about_exclusions(found, tables["participants"], tables["sensitivity"], people)
-    _about_fits(found, notes.get("worths", ()), codebook)
-    _about_spread(found, tables, codebook)
-    found.cannot.append(
+    _about_trend(conclusions, tables["trend"], codebook, alpha)
+    _about_order(conclusions, tables, alpha)
+    _about_images(conclusions, tables, codebook, alpha)
+    _about_agreement(conclusions, tables["agreement"], codebook, alpha, who.capitalize())
+    _about_sides(conclusions, tables, notes, codebook, alpha, who.capitalize())
+    _about_familiarity(conclusions, tables["familiarity_interaction"], codebook, alpha)
+    _about_exclusions(conclusions, tables["participants"], tables["sensitivity"], people)
+    _about_fits(conclusions, notes.get("worths", ()), codebook)
+    _about_spread(conclusions, tables, codebook)
+    conclusions.cannot.append(
         "Nothing here says how people judge, since a program answered."
         if simulated
         else "These answers speak for people like those asked, on displays like theirs, and "
         f"{_images(codebook)}; for other ones they are a guess."
     )
-    return found
+    return conclusions
 
 
 def _about_pairs(
-    found: Conclusions,
+    conclusions: Conclusions,
     where: str,
     rows: pd.DataFrame,
     codebook: Codebook,
@@ -114,7 +116,7 @@ def _about_pairs(
         )
         most = _equals(max(row.holm_p for row in differing))
         most = most if len(differing) == 1 else most.replace("=", "at most")
-        found.can.append(
+        conclusions.can.append(
             f"{where}: {who} preferred {words} ({_test(options)}, p {most} after Holm's "
             "correction; "
             f"{_share(differing, rows)})."
@@ -142,10 +144,10 @@ def _about_pairs(
             words += f": {b} is {number(row.jod, sign=True)} JOD above {a}."
         if row in by["both"]:
             words += " The difference is real, and small."
-        found.can.append(words)
+        conclusions.can.append(words)
     for row in by["undecided"] + by["different"]:
         if row.equivalent == 1:
-            found.cannot.append(
+            conclusions.cannot.append(
                 f"{where}: {codebook.label(row.a)} and {codebook.label(row.b)} come within "
                 f"the margin of {options.margin:g} points when "
                 f"taken alone (two one-sided tests, p {_equals(row.tost_p)}), which holds "
@@ -156,21 +158,21 @@ def _about_pairs(
     untested = [row for row in rows.itertuples() if not np.isfinite(row.holm_p)]
     if untested:
         which = "any pair" if len(untested) == len(rows) else _pairs(untested, codebook)
-        found.cannot.append(f"{where}: too few people answered to test {which}.")
+        conclusions.cannot.append(f"{where}: too few people answered to test {which}.")
     undecided = _undecided(rows, alpha)
     if undecided:
         tail = "neither a difference nor equality is shown"
         if not options.margin and not options.margin_jod:
             tail = "no difference is shown, which does not make them equal"
         if len(undecided) == len(rows) > 1:
-            found.cannot.append(
+            conclusions.cannot.append(
                 f"{where}: all {len(rows)} pairs are undecided: {tail} for any of them."
             )
         else:
             them = _pairs(undecided, codebook)
             if len(undecided) > MOST:
                 them = f"them; {PAIRS} names them"
-            found.cannot.append(
+            conclusions.cannot.append(
                 f"{where}: {_share(undecided, rows)} {'is' if len(undecided) == 1 else 'are'} "
                 f"undecided: {tail} for {them}."
             )
@@ -178,7 +180,7 @@ def _about_pairs(
     if alike:
         which = f"each of all {len(rows)} pairs" if len(alike) == len(rows) > 1 else None
         which = which or _pairs(alike, codebook)
-        found.cannot.append(
+        conclusions.cannot.append(
             f"{where}: everyone gave the same answer about {which}: answers without spread allow "
             "no test of equality."
         )
@@ -198,7 +200,7 @@ def _of(tables: Mapping[str, pd.DataFrame], name: str, framing: str) -> pd.DataF
 
 
 def _about_disagreements(
-    found: Conclusions,
+    conclusions: Conclusions,
     where: str,
     rows: pd.DataFrame,
     contrasts: pd.DataFrame,
@@ -215,23 +217,23 @@ def _about_disagreements(
     def excludes(row: object, low: str, high: str) -> bool:
         return getattr(row, low) > 0 or getattr(row, high) < 0
 
-    alone, together = [], []
+    unadjusted, together = [], []
     for row in undecided:
         if excludes(row, "jod_simultaneous_low", "jod_simultaneous_high") or excludes(
             row, "simultaneous_low", "simultaneous_high"
         ):
             together.append(row)
         elif excludes(row, "jod_low", "jod_high") or excludes(row, "low", "high"):
-            alone.append(row)
-    if alone:
-        found.cannot.append(
+            unadjusted.append(row)
+    if unadjusted:
+        conclusions.cannot.append(
             f"{where}: of the undecided pairs, an interval at {level} of the mean preference or of "
             f"the JOD difference, which is that of one pair alone, excludes 0 for "
-            f"{_pairs(alone, codebook)}; adjusted for all pairs of the family it does not, so that "
-            "no difference is concluded."
+            f"{_pairs(unadjusted, codebook)}; adjusted for all pairs of the family it does not, so "
+            "that no difference is concluded."
         )
     if together:
-        found.cannot.append(
+        conclusions.cannot.append(
             f"{where}: an adjusted interval, of the mean preference or of the JOD difference "
             f"(from answers about all pairs), excludes 0 for {_pairs(together, codebook)}, where "
             "the declared test does not decide; the declared test stands."
@@ -240,7 +242,7 @@ def _about_disagreements(
         row for row in undecided if (row.a, row.b) in other and other[row.a, row.b].holm_p <= alpha
     ]
     if by_model:
-        found.cannot.append(
+        conclusions.cannot.append(
             f"{where}: the contrast of the linear model, from the answers about all pairs, differs "
             f"from 0 after Holm's correction for {_pairs(by_model, codebook, CONTRASTS)}, where "
             "the declared test does not decide; the declared test stands."
@@ -254,7 +256,7 @@ def _about_disagreements(
         and not (one.holm_p <= alpha and one.estimate * row.mean_preference > 0)
     ]
     if not_by_model:
-        found.can.append(
+        conclusions.can.append(
             f"{where}: for {_pairs(not_by_model, codebook, CONTRASTS)} the declared test finds a "
             "difference that the contrast of the linear model, from the answers about all pairs, "
             "does not find after Holm's correction; the declared test stands."
@@ -267,7 +269,7 @@ def _about_disagreements(
         and not excludes(row, "simultaneous_low", "simultaneous_high")
     ]
     if against:
-        found.can.append(
+        conclusions.can.append(
             f"{where}: for {_pairs(against, codebook)} the declared test finds a difference while "
             "the adjusted interval of the mean preference holds 0: it guards all pairs in one "
             "step, Holm's correction in several, and the declared test stands."
@@ -275,7 +277,7 @@ def _about_disagreements(
 
 
 def _about_jod_margin(
-    found: Conclusions,
+    conclusions: Conclusions,
     where: str,
     rows: pd.DataFrame,
     codebook: Codebook,
@@ -291,7 +293,7 @@ def _about_jod_margin(
     meet = [row for row in rows.itertuples() if row.jod_equivalent == 1]
     inner = f"{100 * (1 - 2 * alpha):g} %"
     if not meet:
-        found.cannot.append(
+        conclusions.cannot.append(
             f"{where}: no pair meets the declared margin of {margin:g} JOD by the {inner} interval "
             "of its JOD difference."
         )
@@ -318,11 +320,11 @@ def _about_jod_margin(
         elif len(differ) > MOST:
             them = f"do not call {len(differ)} of them equal"
         words += f" The declared tests in points {them}, and they stand."
-    found.cannot.append(words)
+    conclusions.cannot.append(words)
 
 
 def _about_interaction(
-    found: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook, alpha: float
+    conclusions: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook, alpha: float
 ) -> None:
     """Whether the order of techniques changes from framing to framing, and what pooling means."""
     if "omnibus" not in tables:
@@ -331,13 +333,13 @@ def _about_interaction(
     for row in table[(table.question == "interaction") & table.p.notna()].itertuples():
         together = framing_label(codebook, OVERALL)
         if row.p <= alpha:
-            found.can.append(
+            conclusions.can.append(
                 f"What is preferred depends on the {codebook.level} (interaction of technique and "
                 f"{codebook.level}, sign flips of people, p {_equals(row.p)}): '{together}' "
                 "averages over orders that differ, and is no order of its own."
             )
         else:
-            found.cannot.append(
+            conclusions.cannot.append(
                 f"Whether what is preferred depends on the {codebook.level}: no interaction of "
                 f"technique and {codebook.level} is shown (sign flips of people, p "
                 f"{_equals(row.p)})."
@@ -350,13 +352,15 @@ def _about_interaction(
                 for row in apart.itertuples()
             ]
         )
-        found.cannot.append(
+        conclusions.cannot.append(
             f"No scale of worths describes the pairs at {words}: their differences do not add up; "
             "read the pairs one by one there."
         )
 
 
-def _about_order(found: Conclusions, tables: Mapping[str, pd.DataFrame], alpha: float) -> None:
+def _about_order(
+    conclusions: Conclusions, tables: Mapping[str, pd.DataFrame], alpha: float
+) -> None:
     """Effects of the place in the order and of the question before."""
     if "order_effects" not in tables:
         return
@@ -378,7 +382,7 @@ def _about_order(found: Conclusions, tables: Mapping[str, pd.DataFrame], alpha: 
             )
             words.append(f"{names[row.statistic].format(value)} (p {_equals(row.p)})")
     if words:
-        found.can.append(
+        conclusions.can.append(
             f"The order of questions matters: {'; '.join(words)}. Orders are random for each "
             "person where the study shuffles them, so that this widens intervals and favours no "
             "technique."
@@ -401,7 +405,7 @@ def _images(codebook: Codebook) -> str:
 
 
 def _about_images(
-    found: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook, alpha: float
+    conclusions: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook, alpha: float
 ) -> None:
     """Whether differences hold beyond the images that were shown."""
     table = tables.get("by_images")
@@ -410,19 +414,19 @@ def _about_images(
     hold = [row for row in table.itertuples() if row.holm_p <= alpha]
     images = int(table.images.max())
     if table.holm_p.isna().all():
-        found.cannot.append(
+        conclusions.cannot.append(
             f"Whether differences hold for other images than these {images} kinds: no pair could "
             "be tested, since its mean preference is the same at every kind or it was asked at too "
             "few."
         )
     elif hold:
-        found.can.append(
+        conclusions.can.append(
             f"Taking the {images} kinds of images as a sample of others (t test over them, after "
             "Holm's correction), differences hold beyond them for "
             f"{_pairs(hold, codebook, 'the table of kinds of images')}."
         )
     else:
-        found.cannot.append(
+        conclusions.cannot.append(
             f"Whether differences hold for other images than these {images} kinds: taking them as "
             "a sample, no pair's difference does after Holm's correction; the intervals and tests "
             "of pairs take the images as they are."
@@ -430,7 +434,7 @@ def _about_images(
 
 
 def _about_spread(
-    found: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook
+    conclusions: Conclusions, tables: Mapping[str, pd.DataFrame], codebook: Codebook
 ) -> None:
     """How far people differ in taste, beside how far techniques differ."""
     if "worth_models" not in tables:
@@ -445,13 +449,15 @@ def _about_spread(
                 f"techniques' worths span {number(here.max() - here.min())}"
             )
     if parts:
-        found.can.append(
+        conclusions.can.append(
             "People's own tastes for a technique spread by so many logits (standard deviation, "
             f"ordinal model): {'; '.join(parts)}."
         )
 
 
-def _about_trend(found: Conclusions, trend: pd.DataFrame, codebook: Codebook, alpha: float) -> None:
+def _about_trend(
+    conclusions: Conclusions, trend: pd.DataFrame, codebook: Codebook, alpha: float
+) -> None:
     slope = trend[trend.statistic == "slope_strength"]
     if slope.empty or not np.isfinite(slope.value.iloc[0]):
         return
@@ -469,16 +475,18 @@ def _about_trend(found: Conclusions, trend: pd.DataFrame, codebook: Codebook, al
         words += f" (interval {number(row.low, 3, sign=True)} to {number(row.high, 3, sign=True)}"
         words += f", p {_equals(row.p)})" if np.isfinite(row.p) else ")"
     if np.isfinite(row.p) and row.p <= alpha:
-        found.can.append(
+        conclusions.can.append(
             f"Preferences get {'weaker' if row.value < 0 else 'stronger'} along the framings: "
             f"{words}."
         )
     else:
-        found.cannot.append(f"Whether preferences weaken or grow along the framings: {words}.")
+        conclusions.cannot.append(
+            f"Whether preferences weaken or grow along the framings: {words}."
+        )
 
 
 def _about_agreement(
-    found: Conclusions, agreement: pd.DataFrame, codebook: Codebook, alpha: float, who: str
+    conclusions: Conclusions, agreement: pd.DataFrame, codebook: Codebook, alpha: float, who: str
 ) -> None:
     rows = agreement[agreement.framing != OVERALL].set_index(["framing", "statistic"])
     agree: dict[bool, list[str]] = {True: [], False: []}
@@ -496,19 +504,19 @@ def _about_agreement(
             )
             agree[bool(tested[0].p <= alpha)].append(words)
     if agree[True]:
-        found.can.append(
+        conclusions.can.append(
             f"{who} agree with each other more than chance would: Kendall's u is "
             f"{listed(agree[True])}; 1 would be full agreement."
         )
     if agree[False]:
-        found.cannot.append(
+        conclusions.cannot.append(
             f"Whether {who.lower()} agree with each other more than chance would: Kendall's u "
             f"is {listed(agree[False])}."
         )
 
 
 def _about_sides(
-    found: Conclusions,
+    conclusions: Conclusions,
     tables: Mapping[str, pd.DataFrame],
     notes: Mapping[str, tuple[str, ...]],
     codebook: Codebook,
@@ -526,7 +534,7 @@ def _about_sides(
     ]
     confounded = [line.partition(": ") for line in notes.get("side_balance", ())]
     for framing, _, reason in confounded:
-        found.cannot.append(
+        conclusions.cannot.append(
             f"{framing_label(codebook, framing)}: what is preferred and which side is preferred "
             f"cannot be told apart: {with_labels(reason, codebook)}."
         )
@@ -541,12 +549,12 @@ def _about_sides(
         words = f"{who} lean to one side: of their preferences, the left image got {words}"
         if uneven.empty:
             low, high = 100 * balance.left_share.min(), 100 * balance.left_share.max()
-            found.can.append(
+            conclusions.can.append(
                 f"{words}; sides are balanced against that: each technique stood on the left in "
                 f"{low:.0f} to {high:.0f} % of its answers."
             )
         elif not confounded:
-            found.can.append(f"{words}; sides are not balanced against that.")
+            conclusions.can.append(f"{words}; sides are not balanced against that.")
     if len(uneven) and not confounded:
         named = listed(
             [
@@ -556,14 +564,14 @@ def _about_sides(
             ]
         )
         more = f", and {len(uneven) - MOST} more" if len(uneven) > MOST else ""
-        found.cannot.append(
+        conclusions.cannot.append(
             f"Sides were not shuffled evenly (binomial tests, Holm's correction): {named}{more}; "
             "a preference for a side passes for one for a technique there."
         )
 
 
 def _about_familiarity(
-    found: Conclusions, table: pd.DataFrame, codebook: Codebook, alpha: float
+    conclusions: Conclusions, table: pd.DataFrame, codebook: Codebook, alpha: float
 ) -> None:
     tested = table[table.holm_p.notna()]
     if tested.empty:
@@ -577,7 +585,9 @@ def _about_familiarity(
                 for row in hits.itertuples()
             ]
         )
-        found.can.append(f"Familiarity with computer graphics changes the preference for {words}.")
+        conclusions.can.append(
+            f"Familiarity with computer graphics changes the preference for {words}."
+        )
         return
     least = tested.detectable.min()
     words = "Whether familiarity with computer graphics changes preference: no change is shown"
@@ -586,21 +596,21 @@ def _about_familiarity(
             f", and with so many people only a correlation of {number(least)} or more "
             "would be found four times in five"
         )
-    found.cannot.append(words + ".")
+    conclusions.cannot.append(words + ".")
 
 
 def _about_exclusions(
-    found: Conclusions, participants: pd.DataFrame, sensitivity: pd.DataFrame, people: int
+    conclusions: Conclusions, participants: pd.DataFrame, sensitivity: pd.DataFrame, people: int
 ) -> None:
     out = int(participants.excluded.fillna("").astype(str).ne("").sum())
     if not out:
-        found.can.append(
+        conclusions.can.append(
             f"The rules of exclusion fire for none of {count(people, 'participant')}: no "
             "conclusion hangs on them."
         )
         return
     if out == people or sensitivity.empty:
-        found.cannot.append(
+        conclusions.cannot.append(
             f"The rules exclude {out} of {count(people, 'participant')}: those who are left "
             "are too few to compute the conclusions again."
         )
@@ -611,9 +621,9 @@ def _about_exclusions(
         f"{count(len(sensitivity), 'conclusion')}"
     )
     if changed:
-        found.cannot.append(f"{words} would change; see the table of those.")
+        conclusions.cannot.append(f"{words} would change; see the table of those.")
     else:
-        found.can.append(f"{words} would change: none hangs on them.")
+        conclusions.can.append(f"{words} would change: none hangs on them.")
 
 
 def _test(options: Options) -> str:
@@ -637,7 +647,7 @@ def _pairs(rows: list, codebook: Codebook, table: str = PAIRS) -> str:
     return "; ".join(f"{codebook.label(row.a)} and {codebook.label(row.b)}" for row in rows)
 
 
-def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) -> None:
+def _about_fits(conclusions: Conclusions, notes: tuple[str, ...], codebook: Codebook) -> None:
     """Fits that do not exist, and those that another one stands in for, from the notes
     'FRAMING, MODEL: ...: REASON', models of one reason together.
     """
@@ -655,12 +665,12 @@ def _about_fits(found: Conclusions, notes: tuple[str, ...], codebook: Codebook) 
                 key = framing, reason.rstrip(".")
                 models.setdefault(key, []).append(MODEL_NAMES.get(model, model))
     for (framing, reason), names in refused.items():
-        found.cannot.append(
+        conclusions.cannot.append(
             f"{framing_label(codebook, framing)}: there are no worths by {listed(names)}: "
             f"{with_labels(reason, codebook)}."
         )
     for (framing, reason), names in replaced.items():
-        found.cannot.append(
+        conclusions.cannot.append(
             f"{framing_label(codebook, framing)}: how far apart techniques are by {listed(names)} "
             f"is open on one side: {with_labels(reason, codebook)}, so that maximum likelihood "
             "has no finite worths; fits with reduced bias or weak priors stand in and are marked."

@@ -53,7 +53,7 @@ def options(
             expected = "a number or false" if rule else "a number"
             raise InputError(f"{source}.{key} is {value!r:.60}, expected {expected}")
     try:
-        found = Options(
+        result = Options(
             **{key: tuple(v) if isinstance(v, list) else v for key, v in values.items()},
             exclusions=Exclusions(**{k: None if v is False else v for k, v in rules.items()}),
             posterior=Sampling(**sampling),
@@ -63,7 +63,7 @@ def options(
     chosen = {name: value for name, value in given.items() if value is not None}
     kept = [name for name in values if chosen.get(name, values[name]) == values[name]]
     named = (*kept, *(f"{table}.{name}" for table in TABLES for name in declared.get(table, {})))
-    return replace(found, **chosen, declared=named)
+    return replace(result, **chosen, declared=named)
 
 
 def _known(source: str, table: Mapping[str, object], choices: type) -> None:

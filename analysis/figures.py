@@ -531,13 +531,13 @@ def _lattice(count: int) -> tuple[np.ndarray, np.ndarray, float]:
 
 def draw_responses(
     responses: Responses,
-    found: Mapping[str, Priorities],
+    priorities: Mapping[str, Priorities],
     pair: tuple[str, str],
     slugs: Mapping[str, str],
 ) -> list[Picture]:
     """All figures of a response table.
 
-    found: priorities of the framings that have them; slugs: file names of the framings.
+    priorities: of the framings that have them; slugs: file names of the framings.
     """
     codebook, simulated = responses.codebook, responses.simulated
     used = [
@@ -648,13 +648,15 @@ def draw_responses(
             codebook,
             simulated=simulated,
         )
-    if found:
+    if priorities:
         shares = {
             framing: dict(zip(responses.items[framing], one.vector, strict=True))
-            for framing, one in found.items()
+            for framing, one in priorities.items()
         }
-        without = [codebook.framing_label(name) for name in responses.items if name not in found]
-        pictures += draw_priorities(shares, found, codebook, simulated, without)
+        without = [
+            codebook.framing_label(name) for name in responses.items if name not in priorities
+        ]
+        pictures += draw_priorities(shares, priorities, codebook, simulated, without)
     return pictures
 
 
@@ -695,7 +697,7 @@ def _draw_preferences(responses: Responses, slugs: Mapping[str, str]) -> list[Pi
 
 def draw_priorities(
     shares: Mapping[str, Mapping[str, float]],
-    found: Mapping[str, Priorities],
+    priorities: Mapping[str, Priorities],
     codebook: Codebook,
     simulated: bool = False,
     without: Sequence[str] = (),
@@ -711,7 +713,7 @@ def draw_priorities(
             codebook.framing_label(framing),
             "no CR" if one.cr is None else f"CR {one.cr:z.3f}",
         )
-        for framing, one in found.items()
+        for framing, one in priorities.items()
     }
     return _paged(
         "priorities",

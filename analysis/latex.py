@@ -97,12 +97,12 @@ def document(
     size = [r"\footnotesize" + "\n", rf"\section*{{{escape(title)}}}" + "\n"]
     if simulated:
         size.append(rf"\noindent\textbf{{{SIMULATED}}}: every answer was made by a program." + "\n")
-    said = [
+    paragraphs = [
         rf"\noindent\textbf{{{escape(topic)}.}} {escape(' '.join(sentences))}\par"
         for topic, sentences in notes
     ]
     return "\n".join(
         [PREAMBLE, *size, *(table(one, simulated) for one in tables)]
-        + ([r"\section*{Notes to the tables}", *said] if said else [])
+        + ([r"\section*{Notes to the tables}", *paragraphs] if paragraphs else [])
         + [r"\end{document}", ""]
     )

@@ -102,13 +102,13 @@ PACKAGES = ("subdermal", "numpy", "scipy", "pandas", "matplotlib", "typst")
 
 def versions(further: Iterable[str] = ()) -> dict[str, str]:
     """Name -> version of what made the numbers and the figures, and of further packages."""
-    found = {"Python": platform.python_version()}
+    result = {"Python": platform.python_version()}
     for name in (*PACKAGES, *further):
         try:
-            found[name] = metadata.version(name)
+            result[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = "not installed as a package"
-    return found
+            result[name] = "not installed as a package"
+    return result
 
 
 def rejected_rows(responses: Responses) -> str:
@@ -160,7 +160,7 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
     rows = rejected_rows(responses)
     together = options.family == "study"
     family = f"all {codebook.levels} together" if together else f"each {codebook.level}"
-    found = [
+    result = [
         (
             "Answers",
             f"{responses.participants} {kind} compared images in pairs: {names}; at "
@@ -276,7 +276,7 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             + ". Figures use the palette of [okabe2002].",
         ),
     ]
-    return found
+    return result
 
 
 def markdown(responses: Responses, options: Options, declared: str, command: str = "") -> str:

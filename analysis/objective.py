@@ -64,8 +64,8 @@ def read_measures(
     manifest = path if isinstance(path, ManifestFile) else open_manifest(path)
     images = _images(manifest, factor)
     if not images:
-        spoken = factor.replace("_", " ")
-        why = f"Images have no {spoken}: cost and fidelity are not set beside worths by it."
+        label = factor.replace("_", " ")
+        why = f"Images have no {label}: cost and fidelity are not set beside worths by it."
         return Measured(pd.DataFrame(columns=COLUMNS), (why,))
     rows, notes = defaultdict(list), []
     for image in images:
@@ -278,7 +278,7 @@ def sentences(
     table: pd.DataFrame, correlated: pd.DataFrame, notes: tuple[str, ...], codebook: Codebook
 ) -> list[str]:
     """What is to be said of cost and fidelity beside worth."""
-    said = []
+    lines = []
     for row in correlated.itertuples():
         here = table[(table.framing == row.framing) & (table.measure == row.measure)]
         where, what = codebook.framing_label(row.framing), MEASURES[row.measure]
@@ -292,5 +292,5 @@ def sentences(
             words += (
                 f"; rank correlation with worth {shown} over {row.n} techniques (p = {row.p:.2f})"
             )
-        said.append(words + ".")
-    return said + list(notes)
+        lines.append(words + ".")
+    return lines + list(notes)

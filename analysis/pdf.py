@@ -86,7 +86,7 @@ def rows(pictures: Sequence[Picture]) -> list[list[Picture]]:
     """Rows of figures: two narrow ones beside each other. report.typ puts each on the first page
     that has room for it, so that no page is left half empty before a tall figure.
     """
-    found: list[list[Picture]] = []
+    result: list[list[Picture]] = []
     single: list[Picture] | None = None
     for picture in pictures:
         narrow = 2 * _size_mm(picture.svg)[0] + GAP_MM <= TEXT_MM
@@ -94,9 +94,9 @@ def rows(pictures: Sequence[Picture]) -> list[list[Picture]]:
             single.append(picture)
             single = None
             continue
-        found.append([picture])
-        single = found[-1] if narrow else single
-    return found
+        result.append([picture])
+        single = result[-1] if narrow else single
+    return result
 
 
 def _size_mm(svg: bytes) -> tuple[float, float]:

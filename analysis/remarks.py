@@ -100,7 +100,7 @@ def topics(
     """(topic, sentences) of all tables, in the order of `TOPICS`; first what is said of the table
     of answers.
     """
-    found = {"Answers": [plain(line, codebook) for line in of_table]}
+    by_topic = {"Answers": [plain(line, codebook) for line in of_table]}
     for name, topic in TOPICS.items():
-        found.setdefault(topic, []).extend(remarks(notes.get(name, ()), codebook))
-    return [(topic, sentences) for topic, sentences in found.items() if sentences]
+        by_topic.setdefault(topic, []).extend(remarks(notes.get(name, ()), codebook))
+    return [(topic, sentences) for topic, sentences in by_topic.items() if sentences]

@@ -79,7 +79,7 @@ def report_responses(
         tallies.sides(responses),
     )
     comparisons = ahp.comparisons(responses)
-    found = _found(comparisons)
+    priorities = _priorities(comparisons)
     tables = {
         "scores": scores,
         "totals": totals,
@@ -112,15 +112,15 @@ def report_responses(
 
     simulated = responses.simulated
     pictures = worth_figures.draw_results(results.tables, codebook, options, simulated)
-    said = []
+    cost_words = []
     if measured is not None:
         for measure, rows in beside.groupby("measure", sort=False):
             about = objective.MEASURES[measure]
             pictures += worth_figures.draw_objective(
                 rows, measure, about, codebook, simulated, 100 * options.level
             )
-        said = objective.sentences(beside, correlated, measured.notes, codebook)
-    pictures += figures.draw_responses(responses, found, pair, slugs)
+        cost_words = objective.sentences(beside, correlated, measured.notes, codebook)
+    pictures += figures.draw_responses(responses, priorities, pair, slugs)
     read = shown.all_shown(results.tables, codebook, options)
     read |= {one.name: one for one in shown.not_counted(responses) if one.rows}
     concluded = conclusions.conclude(
@@ -128,7 +128,7 @@ def report_responses(
     )
     chance = results.tables["ahp_consistency"].query("aggregation == 'median'")
     chance = dict(zip(chance.framing, chance.chance_share, strict=True))
-    counted = _summary(responses, scores, totals, sides, comparisons, found, pair, chance)
+    counted = _summary(responses, scores, totals, sides, comparisons, priorities, pair, chance)
     title = codebook.title or "Answers to pairs of images"
     subtitle = (
         "Which of two images looks more realistic: what was answered, what follows "
@@ -139,7 +139,7 @@ def report_responses(
         ("What can be concluded", concluded.can),
         ("What cannot be concluded", concluded.cannot),
         ("What was counted", [*counted, *_not_drawn(responses)]),
-        *([("Cost and fidelity beside worth", said)] if said else []),
+        *([("Cost and fidelity beside worth", cost_words)] if cost_words else []),
     ]
     text = methods.paragraphs(responses, options, declared)
     used = "".join(words for _, words in text)
@@ -191,7 +191,7 @@ def report_responses(
             (codebook.framing_label(row.framing), row.left, row.none, row.right)
             for row in sides.itertuples()
         ],
-        matrices=_matrices(comparisons, found, codebook, chance),
+        matrices=_matrices(comparisons, priorities, codebook, chance),
         priorities=_crossed(tables["ahp_priorities"], "priority", codebook, list(responses.items)),
         rule=RULE,
         order=[codebook.label(name) for name in codebook.techniques],
@@ -217,16 +217,16 @@ def report_matrices(
     codebook = Codebook(
         tuple(comparisons), items, f"that of items in {source}", f"that of {source}"
     )
-    found = _found(comparisons)
+    priorities = _priorities(comparisons)
     slugs = file_names(comparisons)
     table = ahp.priorities_table(comparisons)
     tables = {"ahp_priorities": table} | {
         f"ahp_matrix_{slugs[name]}": _matrix_table(one) for name, one in comparisons.items()
     }
-    shares = {name: dict(zip(items, one.vector, strict=True)) for name, one in found.items()}
+    shares = {name: dict(zip(items, one.vector, strict=True)) for name, one in priorities.items()}
     return _files(
         tables,
-        figures.draw_priorities(shares, found, codebook),
+        figures.draw_priorities(shares, priorities, codebook),
         {},
         title="Priorities from matrices of judgements",
         subtitle="The matrices as given, their priorities and how coherent they are.",
@@ -237,13 +237,13 @@ def report_matrices(
                 [
                     f"{codebook.framing_label(name)}: highest priority for "
                     f"{_listed(_first(share, codebook))}, "
-                    f"{max(share.values()):.3f}. {found[name].sentence()}"
+                    f"{max(share.values()):.3f}. {priorities[name].sentence()}"
                     for name, share in shares.items()
                 ],
             )
         ],
         counts=[("technique", len(items)), ("framing", len(comparisons))],
-        matrices=_matrices(comparisons, found, codebook),
+        matrices=_matrices(comparisons, priorities, codebook),
         priorities=_crossed(table, "priority", codebook, list(comparisons)),
         rule="The matrices were given; nothing was counted here.",
         order=list(items),
@@ -364,7 +364,7 @@ def _pair(responses: Responses, pair: tuple[str, str] | None) -> tuple[str, str]
     return tuple(pair)
 
 
-def _found(comparisons: Mapping[str, Comparison]) -> dict[str, Priorities]:
+def _priorities(comparisons: Mapping[str, Comparison]) -> dict[str, Priorities]:
     return {
         name: ahp.priorities(one.matrix) for name, one in comparisons.items() if not one.missing
     }
@@ -378,7 +378,7 @@ def _matrix_table(comparison: Comparison) -> pd.DataFrame:
 
 def _matrices(
     comparisons: Mapping[str, Comparison],
-    found: Mapping[str, Priorities],
+    priorities: Mapping[str, Priorities],
     codebook: Codebook,
     chance: Mapping[str, float] | None = None,
 ) -> list[dict]:
@@ -390,9 +390,9 @@ def _matrices(
                 ["" if np.isnan(cell) else f"{cell:.4g}" for cell in row] for row in one.matrix
             ],
             "missing": [f"{codebook.label(a)} with {codebook.label(b)}" for a, b in one.missing],
-            "found": found.get(name),
-            "words": found[name].sentence((chance or {}).get(name, np.nan))
-            if name in found
+            "priorities": priorities.get(name),
+            "words": priorities[name].sentence((chance or {}).get(name, np.nan))
+            if name in priorities
             else "",
         }
         for name, one in comparisons.items()
@@ -418,7 +418,7 @@ def _summary(
     totals: pd.DataFrame,
     sides: pd.DataFrame,
     comparisons: Mapping[str, Comparison],
-    found: Mapping[str, Priorities],
+    priorities: Mapping[str, Priorities],
     pair: tuple[str, str],
     chance: Mapping[str, float],
 ) -> list[str]:
@@ -459,8 +459,10 @@ def _summary(
                 f"({most}{' each' if len(best) > 1 else ''} of {total}), "
                 f"{_listed(last)} the fewest ({fewest}{' each' if len(last) > 1 else ''})."
             )
-            if framing in found:
-                shares = dict(zip(comparisons[framing].items, found[framing].vector, strict=True))
+            if framing in priorities:
+                shares = dict(
+                    zip(comparisons[framing].items, priorities[framing].vector, strict=True)
+                )
                 top = _first(shares, codebook)
                 if len(top) == len(shares):
                     words += " The AHP priorities put none before another."
@@ -469,8 +471,8 @@ def _summary(
                         f" The AHP priorities put {_listed(top)} "
                         f"first{' too' if top == best else ''}."
                     )
-        if framing in found:
-            words += f" {found[framing].sentence(chance.get(framing, np.nan))}"
+        if framing in priorities:
+            words += f" {priorities[framing].sentence(chance.get(framing, np.nan))}"
         elif comparisons[framing].missing:
             words += (
                 f" No priorities: {_count(len(comparisons[framing].missing), 'pair')} "

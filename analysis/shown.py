@@ -576,7 +576,7 @@ def all_shown(
     tables: Mapping[str, pd.DataFrame], codebook: Codebook, options: Options
 ) -> dict[str, Shown]:
     """Every table of `compute.everything` that is read, by name, without empty ones."""
-    found: Sequence[Shown] = (
+    tables_read: Sequence[Shown] = (
         worths(tables["worths"], codebook, options),
         pairs(tables["pairs"], codebook, options),
         effects(tables["pairs"], tables["contrasts"], codebook, options),
@@ -593,7 +593,7 @@ def all_shown(
         familiarity(tables["familiarity_interaction"], codebook),
         sensitivity(tables["sensitivity"], codebook),
     )
-    return {one.name: shortened(one) for one in found if one.rows}
+    return {one.name: shortened(one) for one in tables_read if one.rows}
 
 
 def shortened(one: Shown) -> Shown:

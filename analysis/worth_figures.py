@@ -79,11 +79,11 @@ def draw_worths(
     worths: pd.DataFrame, codebook: Codebook, simulated: bool = False, level: float = 95
 ) -> list[Picture]:
     """Every model at every framing: estimates with intervals, each model in its unit."""
-    found = worths[worths.estimate.notna()]
-    if found.empty:
+    table = worths[worths.estimate.notna()]
+    if table.empty:
         return []
-    framings = list(dict.fromkeys(found.framing))
-    most = found.groupby("framing").technique.nunique().max()
+    framings = list(dict.fromkeys(table.framing))
+    most = table.groupby("framing").technique.nunique().max()
     height = 0.3 + 0.21 * most + 0.12
     return figures._paged(
         "worths",
@@ -93,7 +93,7 @@ def draw_worths(
         + f"; lines are intervals at {level:g} %, each of one technique alone: over resampled "
         "participants, for the ordinal model by Wald. Models have units of their own: "
         "compare the order and the gaps against the intervals, not the numbers."
-        + stand_ins(found, codebook)
+        + stand_ins(table, codebook)
         + left_out(worths, codebook),
         figures._chunks(framings, figures._rows_that_fit(height, 0.5)),
         lambda page: "; ".join(
@@ -101,12 +101,12 @@ def draw_worths(
             + ", ".join(
                 f"{codebook.label(row.technique)} {row.estimate:z.2f}" for row in rows.itertuples()
             )
-            for (framing, model), rows in found[found.framing.isin(page)].groupby(
+            for (framing, model), rows in table[table.framing.isin(page)].groupby(
                 ["framing", "model"], sort=False
             )
         ),
         _worths,
-        found,
+        table,
         codebook,
         simulated=simulated,
     )
@@ -187,12 +187,12 @@ def jod_meaning(ties: str) -> str:
     )
 
 
-def stand_ins(found: pd.DataFrame, codebook: Codebook) -> str:
+def stand_ins(table: pd.DataFrame, codebook: Codebook) -> str:
     """A sentence that names the framings whose fit is not maximum likelihood."""
-    if "fit" not in found:
+    if "fit" not in table:
         return ""
     names = [
-        framing_label(codebook, name) for name in dict.fromkeys(found.framing[stood_in(found.fit)])
+        framing_label(codebook, name) for name in dict.fromkeys(table.framing[stood_in(table.fit)])
     ]
     if not names:
         return ""
@@ -211,10 +211,10 @@ def left_out(model: pd.DataFrame, codebook: Codebook) -> str:
     return f" Not drawn, since they have no worths: {', '.join(names)}." if names else ""
 
 
-def starred(framing: str, found: pd.DataFrame, codebook: Codebook, width: int) -> str:
+def starred(framing: str, table: pd.DataFrame, codebook: Codebook, width: int) -> str:
     """The framing's label, cut, with an asterisk where a stand-in was fitted."""
-    here = found[found.framing == framing]
-    star = "fit" in found and stood_in(here.fit).any()
+    here = table[table.framing == framing]
+    star = "fit" in table and stood_in(here.fit).any()
     return figures._cut(framing_label(codebook, framing), width) + (" *" if star else "")
 
 
@@ -227,11 +227,11 @@ def draw_ladder(
 ) -> list[Picture]:
     """The JOD of all techniques, one ladder a framing, each rung a technique."""
     model = worths[worths.model == "thurstone_jod"]
-    found = model[model.estimate.notna()]
-    if found.empty:
+    table = model[model.estimate.notna()]
+    if table.empty:
         return []
-    framings = list(dict.fromkeys(found.framing))
-    height = 0.45 + 0.2 * found.groupby("framing").size().max()
+    framings = list(dict.fromkeys(table.framing))
+    height = 0.45 + 0.2 * table.groupby("framing").size().max()
     return figures._paged(
         "jod_ladder",
         "The JOD ladder",
@@ -239,7 +239,7 @@ def draw_ladder(
         + jod_meaning(ties)
         + f" Bars are intervals at {level:g} % over resampled participants, each of one technique "
         f"alone; 0 is the mean of the {codebook.level}."
-        + stand_ins(found, codebook)
+        + stand_ins(table, codebook)
         + left_out(model, codebook),
         figures._chunks(framings, 2 * figures._rows_that_fit(height, 0.25)),
         lambda page: "; ".join(
@@ -248,10 +248,10 @@ def draw_ladder(
                 f"{codebook.label(row.technique)} {row.estimate:z.2f} JOD"
                 for row in rows.itertuples()
             )
-            for framing, rows in found[found.framing.isin(page)].groupby("framing", sort=False)
+            for framing, rows in table[table.framing.isin(page)].groupby("framing", sort=False)
         ),
         _ladder,
-        found,
+        table,
         codebook,
         simulated=simulated,
     )
@@ -268,17 +268,17 @@ def rungs(ax: Axes, labels: list[str]) -> None:
     ax.grid(axis="x")
 
 
-def _ladder(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
-    most = found.groupby("framing", sort=False).size().max()
+def _ladder(framings: list[str], table: pd.DataFrame, codebook: Codebook) -> Figure:
+    most = table.groupby("framing", sort=False).size().max()
     figure, panels = figures._panels(
         len(framings), min(2, len(framings)), 0.45 + 0.2 * most, below_in=0.25, sharex=True
     )
     for ax, framing in zip(panels, framings, strict=True):
-        here = found[found.framing == framing].sort_values("estimate", ascending=False)
+        here = table[table.framing == framing].sort_values("estimate", ascending=False)
         for place, row in enumerate(here.itertuples()):
             _interval(ax, row.estimate, row.low, row.high, place)
         rungs(ax, [codebook.label(name) for name in here.technique])
-        ax.set_title(starred(framing, found, codebook, 34), loc="left")
+        ax.set_title(starred(framing, table, codebook, 34), loc="left")
     figure.supxlabel("JOD, to the right looks more real", size=8)
     return figure
 
@@ -309,13 +309,13 @@ def draw_pairs(
     """Every pair's mean preference and intervals beside the margin of equivalence; a matrix where
     there are too many pairs to draw one by one.
     """
-    found = pairs[pairs.mean_preference.notna()]
-    if found.empty:
+    table = pairs[pairs.mean_preference.notna()]
+    if table.empty:
         return []
-    verdicts = [verdict(row, alpha) for row in found.itertuples()]
-    found = found.assign(verdict=verdicts)
-    framings = list(dict.fromkeys(found.framing))
-    names = list(dict.fromkeys(zip(found.a, found.b, strict=True)))
+    verdicts = [verdict(row, alpha) for row in table.itertuples()]
+    table = table.assign(verdict=verdicts)
+    framings = list(dict.fromkeys(table.framing))
+    names = list(dict.fromkeys(zip(table.a, table.b, strict=True)))
     title = "Every difference, with its interval" + (" and the margin" if margin else "")
     about = (
         "Mean preference of each pair on the scale from \N{MINUS SIGN}2 to 2: left of 0 for "
@@ -343,9 +343,9 @@ def draw_pairs(
             "difference after Holm's correction; a square: as good as each other. Intervals are in "
             "the table.",
             [[framing] for framing in framings],
-            lambda page: alt(found[found.framing.isin(page)]),
+            lambda page: alt(table[table.framing.isin(page)]),
             _pair_matrix,
-            found,
+            table,
             codebook,
             simulated=simulated,
         )
@@ -373,13 +373,13 @@ def draw_pairs(
         about + lines + verdict_words,
         pages,
         lambda page: alt(
-            found[
-                found.framing.isin(page[0])
-                & np.array([pair in page[1] for pair in zip(found.a, found.b, strict=True)])
+            table[
+                table.framing.isin(page[0])
+                & np.array([pair in page[1] for pair in zip(table.a, table.b, strict=True)])
             ]
         ),
         _pairs,
-        found,
+        table,
         codebook,
         margin,
         simulated=simulated,
@@ -392,7 +392,7 @@ MOST_PAIRS, MOST_PAIR_ROWS = 66, 36
 
 def _pairs(
     page: tuple[list[str], list[tuple[str, str]]],
-    found: pd.DataFrame,
+    table: pd.DataFrame,
     codebook: Codebook,
     margin: float | None,
 ) -> Figure:
@@ -410,7 +410,7 @@ def _pairs(
         if margin:
             ax.axvspan(-margin, margin, color=SKY, alpha=0.22, linewidth=0)
         ax.axvline(0, color=INK, linewidth=0.7)
-        for row in found[found.framing == framing].itertuples():
+        for row in table[table.framing == framing].itertuples():
             if (row.a, row.b) not in place:
                 continue
             y, (_, colour, marker) = place[row.a, row.b], VERDICTS[row.verdict]
@@ -433,7 +433,7 @@ def _pairs(
         "\N{LEFTWARDS ARROW} first technique      mean preference      second technique "
         "\N{RIGHTWARDS ARROW}"
     )
-    used = [one for one in VERDICTS if one in set(found.verdict)]
+    used = [one for one in VERDICTS if one in set(table.verdict)]
     keys = [
         Line2D(
             [], [], color=VERDICTS[one][1], marker=VERDICTS[one][2], markersize=4.5, linewidth=1.6
@@ -446,10 +446,10 @@ def _pairs(
     return figure
 
 
-def _pair_matrix(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
+def _pair_matrix(framings: list[str], table: pd.DataFrame, codebook: Codebook) -> Figure:
     """One framing as a matrix: how much the row is preferred to the column."""
     (framing,) = framings
-    here = found[found.framing == framing]
+    here = table[table.framing == framing]
     items = [name for name in codebook.techniques if name in set(here.a) | set(here.b)]
     place, n = {name: at for at, name in enumerate(items)}, len(items)
     values, marks = np.full((n, n), np.nan), {}
@@ -481,11 +481,11 @@ def draw_scores(
     scores: pd.DataFrame, codebook: Codebook, simulated: bool = False, level: float = 95
 ) -> list[Picture]:
     """The thesis's figure 5.3 with intervals: points as dots, so that overlap can be seen."""
-    found = scores[scores.score.notna() & (scores.framing != OVERALL)]
-    if found.empty:
+    table = scores[scores.score.notna() & (scores.framing != OVERALL)]
+    if table.empty:
         return []
-    framings = list(dict.fromkeys(found.framing))
-    labels = [codebook.label(name) for name in found.technique.unique()]
+    framings = list(dict.fromkeys(table.framing))
+    labels = [codebook.label(name) for name in table.technique.unique()]
     height = 0.5 + figures._row_in(figures._row_labels(labels)) * len(labels)
     return figures._paged(
         "scores_intervals",
@@ -501,17 +501,17 @@ def draw_scores(
                 f"{codebook.label(row.technique)} {row.score:g} ({row.low:g} to {row.high:g})"
                 for row in rows.itertuples()
             )
-            for framing, rows in found[found.framing.isin(page)].groupby("framing", sort=False)
+            for framing, rows in table[table.framing.isin(page)].groupby("framing", sort=False)
         ),
         _scores,
-        found,
+        table,
         codebook,
         simulated=simulated,
     )
 
 
-def _scores(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
-    techniques = [name for name in codebook.techniques if name in set(found.technique)]
+def _scores(framings: list[str], table: pd.DataFrame, codebook: Codebook) -> Figure:
+    techniques = [name for name in codebook.techniques if name in set(table.technique)]
     labels = figures._row_labels([codebook.label(name) for name in techniques])
     figure, panels = figures._panels(
         len(framings),
@@ -522,7 +522,7 @@ def _scores(framings: list[str], found: pd.DataFrame, codebook: Codebook) -> Fig
         sharey=True,
     )
     for ax, framing in zip(panels, framings, strict=True):
-        for row in found[found.framing == framing].itertuples():
+        for row in table[table.framing == framing].itertuples():
             _interval(ax, row.score, row.low, row.high, techniques.index(row.technique))
         ax.set_title(figures._wrapped(codebook.framing_label(framing), 28), loc="left", size=8)
         ax.set_yticks(range(len(labels)), labels, size=7)
@@ -539,11 +539,11 @@ def draw_agreement(
     agreement: pd.DataFrame, codebook: Codebook, simulated: bool = False, level: float = 95
 ) -> list[Picture]:
     """Consistency within and agreement between people, framing by framing."""
-    found = agreement[agreement.statistic.isin(DRAWN) & agreement.value.notna()]
-    if found.empty:
+    table = agreement[agreement.statistic.isin(DRAWN) & agreement.value.notna()]
+    if table.empty:
         return []
-    statistics = [name for name in DRAWN if name in set(found.statistic)]
-    height = 0.62 + 0.32 * found.framing.nunique()
+    statistics = [name for name in DRAWN if name in set(table.statistic)]
+    height = 0.62 + 0.32 * table.framing.nunique()
     return figures._paged(
         "agreement",
         "Consistency and agreement",
@@ -553,29 +553,29 @@ def draw_agreement(
         figures._chunks(statistics, 3 * figures._rows_that_fit(height)),
         lambda page: "; ".join(
             f"{framing_label(codebook, row.framing)}: {DRAWN[row.statistic]} {row.value:z.2f}"
-            for row in found[found.statistic.isin(page)].itertuples()
+            for row in table[table.statistic.isin(page)].itertuples()
         ),
         _agreement,
-        found,
+        table,
         codebook,
         simulated=simulated,
     )
 
 
-def _agreement(statistics: list[str], found: pd.DataFrame, codebook: Codebook) -> Figure:
-    framings = list(dict.fromkeys(found.framing))
+def _agreement(statistics: list[str], table: pd.DataFrame, codebook: Codebook) -> Figure:
+    framings = list(dict.fromkeys(table.framing))
     labels = [figures._wrapped(framing_label(codebook, name), 16) for name in framings]
     figure, panels = figures._panels(
         len(statistics), 3, 0.62 + figures._row_in(labels) * len(labels), sharex=True, sharey=True
     )
     for ax, statistic in zip(panels, statistics, strict=True):
-        for row in found[found.statistic == statistic].itertuples():
+        for row in table[table.statistic == statistic].itertuples():
             _interval(ax, row.value, row.low, row.high, framings.index(row.framing))
         figures._zero(ax)
         ax.set_title(figures._wrapped(DRAWN[statistic], 30), loc="left", size=8)
         ax.set_yticks(range(len(labels)), labels, size=7)
         ax.set_ylim(len(labels) - 0.5, -0.5)
-        ax.set_xlim(min(-0.1, float(np.nanmin(found[["value", "low"]].to_numpy())) - 0.05), 1.05)
+        ax.set_xlim(min(-0.1, float(np.nanmin(table[["value", "low"]].to_numpy())) - 0.05), 1.05)
         ax.tick_params(labelbottom=True)
         ax.grid(axis="x")
     return figure

@@ -79,10 +79,10 @@ def familiarity_interaction(responses: Responses, options: Options) -> pd.DataFr
                 "familiarity"
             )
         slope, low, high = _slopes(x, y, options)
-        found = _detectable(len(x), 1 - options.level)
-        rows.append((name, "", len(x), np.nan, np.nan, np.nan, np.nan, together, np.nan, found))
+        smallest = _detectable(len(x), 1 - options.level)
+        rows.append((name, "", len(x), np.nan, np.nan, np.nan, np.nan, together, np.nan, smallest))
         rows += [
-            (name, item, len(x), slope[k], low[k], high[k], rho[k], p[k], np.nan, found)
+            (name, item, len(x), slope[k], low[k], high[k], rho[k], p[k], np.nan, smallest)
             for k, item in enumerate(panel.items)
         ]
         if name == OVERALL or len(panels(responses)) == 1:

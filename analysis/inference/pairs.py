@@ -62,9 +62,9 @@ def pairs(responses: Responses, options: Options) -> pd.DataFrame:
     """
     rows, notes, draws = [], bootstrap.few(responses), []
     for name, panel in panels(responses).items():
-        part, said, drawn = _of_panel(name, panel, options)
+        part, remarks, drawn = _of_panel(name, panel, options)
         rows += part
-        notes += said
+        notes += remarks
         draws.append(drawn)
     if options.margin is None:
         notes.append(

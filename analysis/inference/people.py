@@ -68,12 +68,12 @@ def signed_rank_counts(counts: np.ndarray) -> np.ndarray:
     kinds, kind = np.unique(
         np.stack([ones[exact], twos[exact]], axis=1), axis=0, return_inverse=True
     )
-    found = p[exact]
+    exact_p = p[exact]
     doubled = np.rint(2 * up[exact]).astype(int)
     for place, (one, two) in enumerate(kinds):
         here = kind.ravel() == place
-        found[here] = _two_tails((one + 1,) * one + (2 * one + two + 1,) * two)[doubled[here]]
-    p[exact] = found
+        exact_p[here] = _two_tails((one + 1,) * one + (2 * one + two + 1,) * two)[doubled[here]]
+    p[exact] = exact_p
     p[n == 0] = 1.0
     p[counts.sum(axis=1) < FEWEST_PEOPLE] = np.nan
     return p.reshape(shape)

@@ -31,15 +31,15 @@ def fit_pilot(
                 f"the pilot at {framing!r} compares its techniques in separate groups; "
                 "expected all to be connected"
             )
-        found = _ordered_probit(counts, most)
+        fit = _ordered_probit(counts, most)
         won = counts[:, :, :3].sum(axis=2) + counts[:, :, 2:].sum(axis=2).T  # a tie both ways
-        if found is None or not worth.strongly_connected(won[None])[0]:
+        if fit is None or not worth.strongly_connected(won[None])[0]:
             raise InputError(
                 f"the pilot at {framing!r} has no finite worths: a technique was never or "
                 "always preferred, or every answer is 0; "
                 "expected more people"
             )
-        fitted, slight, clear = found
+        fitted, slight, clear = fit
         worths[framing] = dict(zip(items, (fitted * SIGMA).tolist(), strict=True))
         cuts.append((slight * SIGMA, clear * SIGMA))
     slight, clear = np.mean(cuts, axis=0)
@@ -74,5 +74,5 @@ def _ordered_probit(counts: np.ndarray, most: int) -> tuple[np.ndarray, float, f
         )  # the sum is free: 0
 
     start = np.r_[np.zeros(n), np.log([0.3, 0.9])]
-    found = optimize.minimize(loss, start, method="BFGS", options={"maxiter": most, "gtol": 1e-3})
-    return found.x[:n] - found.x[:n].mean(), *map(float, cuts(found.x))
+    fit = optimize.minimize(loss, start, method="BFGS", options={"maxiter": most, "gtol": 1e-3})
+    return fit.x[:n] - fit.x[:n].mean(), *map(float, cuts(fit.x))

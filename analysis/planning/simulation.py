@@ -81,13 +81,13 @@ class Studies:
         """(studies, framings) bool: whether the declared test calls the pair equivalent."""
         plan = self.plan
         p = equivalence_counts(self.counts(people), plan.margin)
-        alone, adjusted = self._of_pair(p), self._adjusted(p, correction)
+        uncorrected, adjusted = self._of_pair(p), self._adjusted(p, correction)
         with np.errstate(invalid="ignore"):
-            candidates = (alone < plan.alpha) & (adjusted <= plan.alpha)
+            candidates = (uncorrected < plan.alpha) & (adjusted <= plan.alpha)
         inside = np.zeros(candidates.shape)
         if candidates.any():
             inside[candidates] = self._inside(people, candidates)
-        return equivalent(inside, alone, adjusted, plan.alpha)
+        return equivalent(inside, uncorrected, adjusted, plan.alpha)
 
     def contrasted(self, people: int, correction: str = "family") -> np.ndarray:
         """(studies, framings) bool: whether the contrast of the linear model, which `analyse` sets

@@ -83,9 +83,11 @@ def _needs(plan: Plan, needed: pd.DataFrame, codebook: Codebook) -> list[str]:
         over = f", corrected over the {plan.family} pairs of the family," if plan.family > 1 else ""
         beside = []
         if plan.family > 1:
-            first, alone = (_people(people["declared", one], plan) for one in ("first", "none"))
+            first, uncorrected = (
+                _people(people["declared", one], plan) for one in ("first", "none")
+            )
             beside.append(f"{first} whatever the other pairs come to")
-            beside.append(f"{alone} were the pair the only one tested")
+            beside.append(f"{uncorrected} were the pair the only one tested")
         if ("contrast", "family") in people.index:
             beside.append(
                 f"{_people(people['contrast', 'family'], plan)} by the contrast of all answers, "

@@ -126,17 +126,17 @@ class Posterior:
 
     def doubts(self) -> list[str]:
         """Why the draws may not be those of the posterior; empty where nothing says so."""
-        table, found = self.trust, []
+        table, reasons = self.trust, []
         worst, least = table.r_hat.max(), table.ess.min()
         if not worst <= MOST_R_HAT:
             name = table.parameter[table.r_hat.fillna(np.inf).argmax()]
-            found.append(f"R-hat of {name} is {worst:.3f}, more than {MOST_R_HAT}")
+            reasons.append(f"R-hat of {name} is {worst:.3f}, more than {MOST_R_HAT}")
         if not least >= FEWEST_DRAWS:
             name = table.parameter[table.ess.fillna(0).argmin()]
-            found.append(f"{name} has {least:.0f} effective draws, fewer than {FEWEST_DRAWS}")
+            reasons.append(f"{name} has {least:.0f} effective draws, fewer than {FEWEST_DRAWS}")
         if self.divergences:
-            found.append(f"{self.divergences} draws diverged")
-        return found
+            reasons.append(f"{self.divergences} draws diverged")
+        return reasons
 
     def draws(self) -> bytes:
         """All draws as an .npz: worth, image, side, thresholds, sd_*; with their names."""

@@ -27,22 +27,22 @@ NAMES = {
 
 
 def posterior_files(
-    found: Posterior, responses: Responses, command: str = "", fingerprint: str = ""
+    posterior: Posterior, responses: Responses, command: str = "", fingerprint: str = ""
 ) -> tuple[dict[str, bytes], list[str]]:
     """The files, path -> content, and what they say in short, a sentence each, doubts first;
     fingerprint: of what the study declares, see `analysis.declared`.
     """
-    codebook, simulated, level = responses.codebook, responses.simulated, found.options.level
-    worths, pairs, parameters = found.worths(), found.pairs(), found.parameters()
-    sentences = [*_doubts(found), *_best(found, worths, codebook), *_images(found)]
+    codebook, simulated, level = responses.codebook, responses.simulated, posterior.options.level
+    worths, pairs, parameters = posterior.worths(), posterior.pairs(), posterior.parameters()
+    sentences = [*_doubts(posterior), *_best(posterior, worths, codebook), *_images(posterior)]
     tables = {"posterior_worths": worths, "posterior_pairs": pairs}
     tables |= {"posterior_parameters": parameters}
-    page = _page(found, responses, tables, sentences, command, fingerprint)
+    page = _page(posterior, responses, tables, sentences, command, fingerprint)
     files = {
         f"{name}.csv": csv_bytes(table.assign(simulated=int(simulated)), 6)
         for name, table in tables.items()
     }
-    files |= {"posterior.npz": found.draws(), "posterior.md": page.encode()}
+    files |= {"posterior.npz": posterior.draws(), "posterior.md": page.encode()}
     for picture in draw_posterior(worths, codebook, simulated, level):
         files |= picture.files
     return files, sentences
@@ -54,8 +54,8 @@ def place_label(codebook: Codebook, name: str) -> str:
     return named.get(name) or codebook.framing_label(name)
 
 
-def _doubts(found: Posterior) -> list[str]:
-    doubts = found.doubts()
+def _doubts(posterior: Posterior) -> list[str]:
+    doubts = posterior.doubts()
     if not doubts:
         return []
     return [
@@ -64,7 +64,7 @@ def _doubts(found: Posterior) -> list[str]:
     ]
 
 
-def _best(found: Posterior, worths: pd.DataFrame, codebook: Codebook) -> list[str]:
+def _best(posterior: Posterior, worths: pd.DataFrame, codebook: Codebook) -> list[str]:
     """Which technique is most probably the best, at each place."""
     sentences = []
     for name, rows in worths.groupby("framing", sort=False):
@@ -76,12 +76,14 @@ def _best(found: Posterior, worths: pd.DataFrame, codebook: Codebook) -> list[st
     return sentences
 
 
-def _images(found: Posterior) -> list[str]:
+def _images(posterior: Posterior) -> list[str]:
     """What one image can change."""
-    level = found.options.level
-    if len(found.images) < 2:
+    level = posterior.options.level
+    if len(posterior.images) < 2:
         return ["One kind of image was shown: nothing is said of others."]
-    low, middle, high = np.quantile(found.spread["image"], [(1 - level) / 2, 0.5, (1 + level) / 2])
+    low, middle, high = np.quantile(
+        posterior.spread["image"], [(1 - level) / 2, 0.5, (1 + level) / 2]
+    )
     return [
         f"What a technique gains or loses from image to image spreads by {middle:.2f} logits "
         f"[{low:.2f}, {high:.2f}]; rows of 'a new image' have that in their intervals."
@@ -97,24 +99,25 @@ def _origin(options: Options) -> str:
 
 
 def _page(
-    found: Posterior,
+    posterior: Posterior,
     responses: Responses,
     tables: dict[str, pd.DataFrame],
     sentences: list[str],
     command: str,
     fingerprint: str,
 ) -> str:
-    codebook, sampling = responses.codebook, found.options.posterior
-    percent = f"{100 * found.options.level:g} %"
+    codebook, sampling = responses.codebook, posterior.options.posterior
+    percent = f"{100 * posterior.options.level:g} %"
     lines = ["# What the answers make of the techniques, by a Bayesian model", ""]
     if responses.simulated:
         lines += [f"**{SIMULATED}**", ""]
     lines += [f"- {sentence}" for sentence in sentences]
     lines += [
         "",
-        f"{found.answers} answers of {found.people} participants at {len(found.images)} kinds of "
-        f"images. Worths are in logits, 0 is the mean of the techniques, intervals are central and "
-        f"hold {percent} of the posterior. People and images are both samples: a technique's worth "
+        f"{posterior.answers} answers of {posterior.people} participants at "
+        f"{len(posterior.images)} kinds of images. Worths are in logits, 0 is the mean of the "
+        f"techniques, intervals are central and hold {percent} of the posterior. People and images "
+        "are both samples: a technique's worth "
         "is that over all images, and what one image adds to it is drawn from a spread of its own.",
         "",
         "![Worths](figures/posterior.svg)",
@@ -157,8 +160,8 @@ def _page(
         f"{priors['clear']:g}; normal: the side {priors['side']:g}.",
         f"- {sampling.chains} chains of {sampling.draws} draws after {sampling.warmup} of warm-up, "
         f"No-U-Turn sampler aiming at an acceptance of {sampling.target_acceptance:g}, seed "
-        f"{found.options.seed}.",
-        f"- {_origin(found.options)}",
+        f"{posterior.options.seed}.",
+        f"- {_origin(posterior.options)}",
         *([f"- sha256 of the study's [analysis]: {fingerprint}."] if fingerprint else []),
         f"- Answers: {responses.source}, sha256 {responses.sha256}.",
         "- " + ", ".join(f"{k} {v}" for k, v in versions(("jax", "numpyro")).items()) + ".",

@@ -136,11 +136,11 @@ def _separated(panel: Panel, model: str) -> bool:
                     if category > 0:
                         rows.append([*eta, *(-cuts[category - 1])])
     rows = np.array(rows)
-    found = optimize.linprog(
+    solution = optimize.linprog(
         -rows.sum(axis=0),
         A_ub=-rows,
         b_ub=np.zeros(len(rows)),
         bounds=[(-1, 1)] * size,
         method="highs",
     )
-    return bool(-found.fun > 1e-7)
+    return bool(-solution.fun > 1e-7)

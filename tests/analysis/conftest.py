@@ -232,13 +232,13 @@ def studies(tmp_path_factory, random_study):
     """simulated or not -> Responses of 8 people."""
     from analysis import read_responses
 
-    found = {}
+    result = {}
     for simulated in (False, True):
         path = tmp_path_factory.mktemp("study") / "responses.csv"
         lines = [",".join(map(str, (*row, int(simulated)))) for row in random_study(8, seed=4)]
         path.write_text("\n".join([HEADER + ",simulated", *lines]))
-        found[simulated] = read_responses(path)
-    return found
+        result[simulated] = read_responses(path)
+    return result
 
 
 @pytest.fixture(scope="session")

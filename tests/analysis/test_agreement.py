@@ -44,8 +44,8 @@ def counted(ratings):
     return np.stack([(ratings == value).sum(axis=0) for value in range(1, 6)], axis=1).astype(float)
 
 
-def values(found, framing="close-up"):
-    return found[found.framing == framing].set_index("statistic")
+def values(result, framing="close-up"):
+    return result[result.framing == framing].set_index("statistic")
 
 
 # --- alpha, u, triads
@@ -134,8 +134,8 @@ def test_coins_are_those_of_every_throw(crowd, table):
         panel = crowd(3, [0, 0, 0], seed=1)
         preference = np.ones((3, 3), np.int8)
         preference[0, :flips] = -1
-        found = values(agreement(table(replace(panel, preference=preference)), options))
-        assert found.p["kendall_u_conditional"] == pytest.approx(chance, abs=0.01)
+        result = values(agreement(table(replace(panel, preference=preference)), options))
+        assert result.p["kendall_u_conditional"] == pytest.approx(chance, abs=0.01)
 
 
 def brute_force(sign, n):
@@ -199,42 +199,44 @@ def study(crowd):
 
 
 def test_agreement_has_its_columns_and_every_statistic_for_every_framing(study, table):
-    found = agreement(table(*study), replace(FAST, models=("ordinal",)))
-    assert list(found.columns) == ["framing", "statistic", "value", "low", "high", "p"]
-    names = found.groupby("framing").statistic.apply(set)
+    result = agreement(table(*study), replace(FAST, models=("ordinal",)))
+    assert list(result.columns) == ["framing", "statistic", "value", "low", "high", "p"]
+    names = result.groupby("framing").statistic.apply(set)
     assert (
         names["close-up"]
         == names["head-shot"]
         == names["overall"] | {"pooled_circular_triads", "pooled_zeta"}
     )
-    inside = found.dropna(subset=["low"])
+    inside = result.dropna(subset=["low"])
     assert len(inside) > 20 and ((inside.low <= inside.value) & (inside.value <= inside.high)).all()
-    assert found.p.dropna().between(0, 1).all()
+    assert result.p.dropna().between(0, 1).all()
 
 
 def test_sides_of_people_who_lean(study, table):
-    found = values(agreement(table(*study), replace(FAST, models=("ordinal",))), "overall")
+    result = values(agreement(table(*study), replace(FAST, models=("ordinal",))), "overall")
     responses = table(*study).frame
     decided = responses.answer[responses.answer != 0]
     assert (
-        found.value["left_share"] == pytest.approx((decided < 0).mean())
-        and found.p["left_share"] < 0.05
+        result.value["left_share"] == pytest.approx((decided < 0).mean())
+        and result.p["left_share"] < 0.05
     )
-    assert found.value["mean_answer"] == pytest.approx(responses.answer.mean())
+    assert result.value["mean_answer"] == pytest.approx(responses.answer.mean())
     assert (
-        found.value["side_effect"] == pytest.approx(0.9, abs=0.4) and found.p["side_effect"] < 0.05
+        result.value["side_effect"] == pytest.approx(0.9, abs=0.4)
+        and result.p["side_effect"] < 0.05
     )
 
 
 def test_times_are_medians_of_medians(study, table):
     responses = table(*study)
-    found = values(agreement(responses, FAST), "overall").value
+    result = values(agreement(responses, FAST), "overall").value
     frame = responses.frame
     assert (
-        found["median_rt_ms"] == frame.groupby("participant", observed=True).rt_ms.median().median()
+        result["median_rt_ms"]
+        == frame.groupby("participant", observed=True).rt_ms.median().median()
     )
     none = frame[frame.strength == 0].groupby("participant", observed=True).rt_ms.median().median()
-    assert found["median_rt_ms_none"] == none
+    assert result["median_rt_ms_none"] == none
 
 
 def test_other_sides_orders_and_twice_the_people(study, table):
@@ -315,8 +317,8 @@ def test_questions_asked_again(write):
         [-2, -1],
         [0, 1],
     ]
-    found = values(agreement(responses, FAST)).value
-    assert found["repeat_share"] == pytest.approx(2 / 3) and found[
+    result = values(agreement(responses, FAST)).value
+    assert result["repeat_share"] == pytest.approx(2 / 3) and result[
         "repeat_same_answer"
     ] == pytest.approx(1 / 4)
     people = participants(responses, FAST).set_index("participant")
@@ -327,13 +329,16 @@ def test_questions_asked_again(write):
 
 
 def test_nothing_asked_again_and_one_participant_are_said(lines):
-    found = agreement(lines("a>b b>c a>c"), FAST)
-    notes = " ".join(found.attrs["notes"])
+    result = agreement(lines("a>b b>c a>c"), FAST)
+    notes = " ".join(result.attrs["notes"])
     assert "no question was asked again" in notes and "one participant: no agreement" in notes
     assert (
-        values(found).loc[["kendall_u", "krippendorff_alpha", "repeat_share"], "value"].isna().all()
+        values(result)
+        .loc[["kendall_u", "krippendorff_alpha", "repeat_share"], "value"]
+        .isna()
+        .all()
     )
-    assert values(found).value["zeta"] == 1 and found[["low", "high"]].isna().all(axis=None)
+    assert values(result).value["zeta"] == 1 and result[["low", "high"]].isna().all(axis=None)
 
 
 def test_two_techniques_and_incomplete_answers_have_no_circles(lines):
@@ -341,9 +346,9 @@ def test_two_techniques_and_incomplete_answers_have_no_circles(lines):
         "fewer than three techniques" in note
         for note in agreement(lines(*["a>b"] * 6), FAST).attrs["notes"]
     )
-    found = agreement(lines(*["a>b b>c"] * 6), FAST)
-    assert any("nobody answered every pair" in note for note in found.attrs["notes"])
-    assert np.isnan(values(found).value["zeta"]) and np.isnan(values(found).value["pooled_zeta"])
+    result = agreement(lines(*["a>b b>c"] * 6), FAST)
+    assert any("nobody answered every pair" in note for note in result.attrs["notes"])
+    assert np.isnan(values(result).value["zeta"]) and np.isnan(values(result).value["pooled_zeta"])
 
 
 # --- participants and exclusions
@@ -351,9 +356,9 @@ def test_two_techniques_and_incomplete_answers_have_no_circles(lines):
 
 
 def test_participants_by_hand(lines):
-    found = participants(lines("a>b b>>c a=c", "a>b b>c a>c", "a<b b<c a<c"), FAST)
-    assert list(found.columns) == list(PARTICIPANTS)
-    first = found.iloc[0]
+    result = participants(lines("a>b b>>c a=c", "a>b b>c a>c", "a<b b<c a<c"), FAST)
+    assert list(result.columns) == list(PARTICIPANTS)
+    first = result.iloc[0]
     assert first[
         ["answers", "left", "none", "right", "circular_triads", "zeta", "repeats"]
     ].tolist() == [3, 2, 1, 0, 0, 1, 0]
@@ -364,7 +369,7 @@ def test_participants_by_hand(lines):
     )
     # the others cancel out in all three pairs
     assert np.isnan(first.agreement_with_others)
-    assert found.agreement_with_others[2] == pytest.approx(-(2 + 3 + 1) / np.sqrt(3 * (4 + 9 + 1)))
+    assert result.agreement_with_others[2] == pytest.approx(-(2 + 3 + 1) / np.sqrt(3 * (4 + 9 + 1)))
 
 
 def faulty(study, table):
@@ -382,13 +387,13 @@ def faulty(study, table):
 
 
 def test_declared_exclusions_name_their_rule(study, table):
-    found = participants(faulty(study, table), FAST).set_index("participant").excluded
+    result = participants(faulty(study, table), FAST).set_index("participant").excluded
     assert (
-        found["P0000"] == "one_side_share; same_answer_share"
-        and found["P0001"] == "same_answer_share"
-        and found["P0002"] == "answered_share"
+        result["P0000"] == "one_side_share; same_answer_share"
+        and result["P0001"] == "same_answer_share"
+        and result["P0002"] == "answered_share"
     )
-    assert (found.iloc[3:] == "").all()
+    assert (result.iloc[3:] == "").all()
     none = Exclusions(
         answered_share=None, one_side_share=None, median_rt_ms=None, same_answer_share=None
     )
@@ -403,9 +408,9 @@ def test_declared_exclusions_name_their_rule(study, table):
 def test_a_rule_needs_enough_answers_to_fire(lines):
     """One pair, one answer each: the default rule of the same answer excluded everybody."""
     responses = lines("a>b", "a<b", "a=b", "a>b", "a>>b", "a<<b")
-    found = participants(responses, Options())
-    assert (found.same_answer_share == 1).all() and (found.excluded == "").all()
-    assert any("same_answer_share can fire for nobody" in one for one in found.attrs["notes"])
+    result = participants(responses, Options())
+    assert (result.same_answer_share == 1).all() and (result.excluded == "").all()
+    assert any("same_answer_share can fire for nobody" in one for one in result.attrs["notes"])
     ten = lines(*["a=b a=c a=d a=e b=c b=d b=e c=d c=e d=e"] * 6)
     assert (participants(ten, Options()).excluded == "same_answer_share").all()
 
@@ -422,13 +427,13 @@ def test_sensitivity_takes_the_reports_verdicts(study, table):
     """Each conclusion with everyone is the verdict that the table of pairs comes to."""
     options = replace(FAST, margin=0.9)
     responses = faulty(study, table)
-    found = sensitivity(responses, options).set_index(["framing", "conclusion", "a", "b"])
+    result = sensitivity(responses, options).set_index(["framing", "conclusion", "a", "b"])
     rows = inference.pairs(responses, options)
     verdicts = [inference.verdict(row, 0.05) for row in rows.itertuples()]
     unadjusted = rows.equivalent == 1
     assert sum(one in ("equivalent", "both") for one in verdicts) < unadjusted.sum()
     for row, one in zip(rows.itertuples(), verdicts, strict=True):
-        equal = found.everyone[row.framing, "equivalent", row.a, row.b]
+        equal = result.everyone[row.framing, "equivalent", row.a, row.b]
         assert equal == str(int(one in ("equivalent", "both")))
 
 
@@ -441,9 +446,9 @@ def test_sides_that_follow_the_technique_are_named(write, answer):
             turn = rng.random() < 0.5
             fixed.append(answer(f"P{person}", "close-up", a, b, value))
             shuffled.append(answer(f"P{person}", "close-up", *((b, a) if turn else (a, b)), value))
-    found = side_balance(read_responses(write(fixed)), FAST).set_index("technique")
-    assert found.left.tolist() == [24, 12, 0] and found.holm_p["a"] < 1e-5
-    assert "a was always on the left; c was always on the right" in found.attrs["notes"][0]
+    result = side_balance(read_responses(write(fixed)), FAST).set_index("technique")
+    assert result.left.tolist() == [24, 12, 0] and result.holm_p["a"] < 1e-5
+    assert "a was always on the left; c was always on the right" in result.attrs["notes"][0]
     fine = side_balance(read_responses(write(shuffled)), FAST)
     assert (fine.holm_p > 0.05).all() and not fine.attrs["notes"]
     assert (fine.left + fine.right).tolist() == [24, 24, 24]
@@ -457,8 +462,8 @@ def test_sides_that_follow_the_technique_are_named(write, answer):
 
 def test_sensitivity_compares_with_and_without(study, table):
     responses = faulty(study, table)
-    found = sensitivity(responses, FAST)
-    assert list(found.columns) == [
+    result = sensitivity(responses, FAST)
+    assert list(result.columns) == [
         "framing",
         "conclusion",
         "a",
@@ -467,15 +472,15 @@ def test_sensitivity_compares_with_and_without(study, table):
         "without_excluded",
         "changed",
     ]
-    assert found.attrs["notes"][0].startswith("3 of 20 participants are excluded")
-    assert set(found.conclusion) == {"preferred", "first"} and len(found) == 3 * (6 + 1)
+    assert result.attrs["notes"][0].startswith("3 of 20 participants are excluded")
+    assert set(result.conclusion) == {"preferred", "first"} and len(result) == 3 * (6 + 1)
     assert (
-        found.changed == (found.everyone != found.without_excluded)
+        result.changed == (result.everyone != result.without_excluded)
     ).all() and responses.participants == 20
     alone = table(*(panel.chosen(np.arange(3, 20)) for panel in study), order="abcd")
     clean = sensitivity(alone, FAST)
     assert (
-        clean.everyone.to_numpy() == found.without_excluded.to_numpy()
+        clean.everyone.to_numpy() == result.without_excluded.to_numpy()
     ).all() and not clean.changed.any()
     everyone = sensitivity(responses, replace(FAST, exclusions=Exclusions(0.99, median_rt_ms=1e9)))
     assert everyone.empty and "nobody is left" in everyone.attrs["notes"][1]
@@ -517,9 +522,9 @@ def alike(answer):
 def test_ties_alone_make_nobody_consistent():
     """No triad without a tie: zeta has no number, rather than the 1 of a person without circles."""
     responses = alike(0)
-    found = values(agreement(responses, FAST), "f").value
-    assert found[["circular_triads", "zeta", "pooled_zeta"]].isna().all()
-    assert found["zeta_guessed"] == pytest.approx(0.75 * 1 + 0.25 * 0)
+    result = values(agreement(responses, FAST), "f").value
+    assert result[["circular_triads", "zeta", "pooled_zeta"]].isna().all()
+    assert result["zeta_guessed"] == pytest.approx(0.75 * 1 + 0.25 * 0)
     assert participants(responses, FAST).zeta.isna().all()
     assert participants(alike(1), FAST).zeta.eq(1).all()
 

@@ -31,10 +31,10 @@ PUBLISHED = {
 @pytest.mark.parametrize("framing", PUBLISHED)
 def test_the_published_matrices_give_the_published_numbers(framing):
     vector, ci, cr = PUBLISHED[framing]
-    found = priorities(read_matrices(MATRICES)[framing].matrix)
-    assert found.vector == pytest.approx(vector, abs=1e-4)
-    assert found.ci == pytest.approx(ci, abs=1e-4) and found.cr == pytest.approx(cr, abs=1e-4)
-    assert found.lambda_max == pytest.approx(5 + 4 * found.ci)
+    result = priorities(read_matrices(MATRICES)[framing].matrix)
+    assert result.vector == pytest.approx(vector, abs=1e-4)
+    assert result.ci == pytest.approx(ci, abs=1e-4) and result.cr == pytest.approx(cr, abs=1e-4)
+    assert result.lambda_max == pytest.approx(5 + 4 * result.ci)
 
 
 def test_judgements_are_the_scale_of_the_thesis():
@@ -63,53 +63,53 @@ def test_priorities_are_those_of_power_iteration(n):
     vector = np.ones(n) / n
     for _ in range(500):
         vector = matrix @ vector / (matrix @ vector).sum()
-    found = priorities(matrix)
-    assert found.vector == pytest.approx(vector, abs=1e-10) and found.vector.sum() == pytest.approx(
-        1
-    )
-    assert found.lambda_max == pytest.approx((matrix @ vector).sum(), abs=1e-9)
+    result = priorities(matrix)
+    assert result.vector == pytest.approx(
+        vector, abs=1e-10
+    ) and result.vector.sum() == pytest.approx(1)
+    assert result.lambda_max == pytest.approx((matrix @ vector).sum(), abs=1e-9)
     if n > 10:
-        assert found.cr is None and "no random index beyond 10" in found.verdict
+        assert result.cr is None and "no random index beyond 10" in result.verdict
     else:
-        assert found.cr == pytest.approx((found.lambda_max - n) / (n - 1) / RANDOM_INDEX[n - 1])
+        assert result.cr == pytest.approx((result.lambda_max - n) / (n - 1) / RANDOM_INDEX[n - 1])
 
 
 def test_a_consistent_matrix_gives_back_its_worths_and_is_coherent():
     worth = np.array([0.1, 0.2, 0.3, 0.4])
-    found = priorities(worth[:, None] / worth)
-    assert found.vector == pytest.approx(worth) and found.ci == 0 and found.verdict == "coherent"
+    result = priorities(worth[:, None] / worth)
+    assert result.vector == pytest.approx(worth) and result.ci == 0 and result.verdict == "coherent"
 
 
 def test_one_and_two_items_are_always_coherent():
     for matrix in ([[1.0]], [[1, 3], [1 / 3, 1]]):
-        found = priorities(np.array(matrix))
-        assert (found.ci, found.cr) == (0, 0)
-    assert found.vector == pytest.approx([0.75, 0.25])
+        result = priorities(np.array(matrix))
+        assert (result.ci, result.cr) == (0, 0)
+    assert result.vector == pytest.approx([0.75, 0.25])
     words = "Two techniques have one judgement, which nothing can contradict: CR says nothing."
-    assert found.sentence() == words
+    assert result.sentence() == words
 
 
 def test_a_circle_is_incoherent():
     circle = np.array([[1, 3, 1 / 3], [1 / 3, 1, 3], [3, 1 / 3, 1]])
-    found = priorities(circle)
+    result = priorities(circle)
     assert (
-        found.vector == pytest.approx([1 / 3] * 3)
-        and found.cr > 0.1
-        and found.verdict.startswith("incoherent")
+        result.vector == pytest.approx([1 / 3] * 3)
+        and result.cr > 0.1
+        and result.verdict.startswith("incoherent")
     )
 
 
 def test_pairs_that_nobody_compared_are_named_and_give_no_priorities(write, answer):
     rows = [answer("P1", "close-up", *pair, 1) for pair in ("ab", "bc", "cd")]
     rows += [answer("P1", "head-shot", "a", "b", 1)]
-    found = comparisons(read_responses(write(rows), order="abcd"))
-    assert found["close-up"].missing == [("a", "c"), ("a", "d"), ("b", "d")]
-    assert found["head-shot"].items == ("a", "b") and not found["head-shot"].missing
-    table = priorities_table(found)
+    result = comparisons(read_responses(write(rows), order="abcd"))
+    assert result["close-up"].missing == [("a", "c"), ("a", "d"), ("b", "d")]
+    assert result["head-shot"].items == ("a", "b") and not result["head-shot"].missing
+    table = priorities_table(result)
     assert table[table.framing == "close-up"].iloc[:, 2:].isna().all(axis=None)
     assert table[table.framing == "head-shot"].priority.tolist() == pytest.approx([1 / 3, 2 / 3])
     with pytest.raises(InputError, match="complete"):
-        priorities(found["close-up"].matrix)
+        priorities(result["close-up"].matrix)
 
 
 def test_doubling_the_people_changes_no_median_and_no_priority(write, random_study):

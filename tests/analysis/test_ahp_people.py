@@ -73,19 +73,19 @@ def test_the_medians_are_those_of_the_first_report(crowd, table):
     assert aggregated(panel, panel.counts, "median") == pytest.approx(
         comparisons(responses)["close-up"].matrix
     )
-    found = (
+    result = (
         priority_intervals(responses, FAST)
         .set_index(["aggregation", "method", "technique"])
         .sort_index(sort_remaining=False)
     )
     published = priorities(comparisons(responses)["close-up"].matrix)
-    assert found.priority["median", "eigenvector"].to_numpy() == pytest.approx(published.vector)
+    assert result.priority["median", "eigenvector"].to_numpy() == pytest.approx(published.vector)
     consistency = consistency_intervals(responses, FAST).set_index("aggregation")
     assert consistency.ci["median"] == pytest.approx(published.ci) and consistency.cr[
         "median"
     ] == pytest.approx(published.cr)
-    assert found.groupby(["aggregation", "method"]).priority.sum().to_numpy() == pytest.approx(1)
-    assert ((found.low <= found.high) & (found.low > 0)).all() and (
+    assert result.groupby(["aggregation", "method"]).priority.sum().to_numpy() == pytest.approx(1)
+    assert ((result.low <= result.high) & (result.low > 0)).all() and (
         consistency.ci_low <= consistency.ci_high
     ).all()
 
@@ -119,21 +119,21 @@ def test_the_judgement_to_look_at_again_is_the_one_that_was_turned():
 
 
 def test_an_incoherent_circle_is_named_in_the_table(lines):
-    found = consistency_intervals(lines(*["a>>b b>>c a<<c"] * 6), FAST).iloc[0]
+    result = consistency_intervals(lines(*["a>>b b>>c a<<c"] * 6), FAST).iloc[0]
     assert (
-        found.cr > 0.1
-        and {found.a, found.b} <= set("abc")
-        and found.judgement in (3, pytest.approx(1 / 3))
+        result.cr > 0.1
+        and {result.a, result.b} <= set("abc")
+        and result.judgement in (3, pytest.approx(1 / 3))
     )
     fine = consistency_intervals(lines(*["a>b b>c a>>c"] * 6), FAST).iloc[0]
     assert fine.cr < 0.1 and fine.a == "" and np.isnan(fine.judgement)
 
 
 def test_missing_pairs_and_eleven_items_are_said(crowd, table, lines):
-    found = priority_intervals(lines(*["a>b b>c"] * 6), FAST)
+    result = priority_intervals(lines(*["a>b b>c"] * 6), FAST)
     assert (
-        found[["priority", "low", "high"]].isna().all(axis=None)
-        and "a pair has no answer" in found.attrs["notes"][0]
+        result[["priority", "low", "high"]].isna().all(axis=None)
+        and "a pair has no answer" in result.attrs["notes"][0]
     )
     eleven = consistency_intervals(table(crowd(8, np.linspace(-1, 1, 11), seed=1)), FAST)
     assert (

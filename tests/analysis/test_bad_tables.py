@@ -108,16 +108,16 @@ def test_only_ties_have_no_worths_and_no_winner(report):
 
 
 def test_no_ties_at_all(report):
-    found = worths(report(12, ["a", "b", "c"], lambda rng, a, b: int(rng.choice([-2, -1, 1, 2]))))
-    assert found[found.model == "bradley_terry"].estimate.notna().all()
+    result = worths(report(12, ["a", "b", "c"], lambda rng, a, b: int(rng.choice([-2, -1, 1, 2]))))
+    assert result[result.model == "bradley_terry"].estimate.notna().all()
 
 
 def test_an_unbeaten_technique_is_named_and_its_fit_is_marked(report):
     files = report(8, ["a", "b", "c"], lambda rng, a, b: -2 if a == "a" else any_answer(rng, a, b))
     text = in_short(files)
     assert "a was never beaten by b, c or tied with them" in text and "reduced bias" in text
-    found = worths(files).query("model == 'thurstone_jod'")
-    assert found.estimate.notna().all() and set(found.fit) == {"reduced bias"}
+    result = worths(files).query("model == 'thurstone_jod'")
+    assert result.estimate.notna().all() and set(result.fit) == {"reduced bias"}
 
 
 def test_groups_that_never_met_are_named(report):

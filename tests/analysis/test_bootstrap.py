@@ -41,16 +41,16 @@ def test_chunks_change_nothing(monkeypatch):
 
 def test_counts_are_those_of_the_people_drawn(crowd):
     panel, options = crowd(12, [0, 0.4, 1], seed=1), Options(resamples=100, seed=5)
-    found = bootstrap.counts(panel, options)
+    result = bootstrap.counts(panel, options)
     for resample, drawn in enumerate(weights(12, 100, 5)[:20]):
         people = panel.preference[np.repeat(np.arange(12), drawn.astype(int))]
-        assert np.array_equal(found[resample], (people[:, :, None] == PREFERENCES).sum(axis=0))
+        assert np.array_equal(result[resample], (people[:, :, None] == PREFERENCES).sum(axis=0))
 
 
 def test_counts_of_thousands_are_whole_numbers(crowd):
     panel = crowd(3000, [0, 1], seed=1)
-    found = bootstrap.counts(panel, Options(resamples=100))
-    assert np.array_equal(found, np.rint(found)) and (found.sum(axis=(1, 2)) == 3000).all()
+    result = bootstrap.counts(panel, Options(resamples=100))
+    assert np.array_equal(result, np.rint(result)) and (result.sum(axis=(1, 2)) == 3000).all()
 
 
 def test_the_interval_of_a_mean_is_students(crowd):
@@ -112,11 +112,11 @@ def test_scores_are_the_tallies_with_an_interval(crowd, table):
     responses = table(
         crowd(15, [0, 0.4, 1], seed=1), crowd(15, [0, 0.2, 0.2], seed=2, framing="head-shot")
     )
-    found = score_intervals(responses, Options(resamples=200))
-    each = found[found.framing != "overall"].reset_index(drop=True)
+    result = score_intervals(responses, Options(resamples=200))
+    each = result[result.framing != "overall"].reset_index(drop=True)
     assert each[["framing", "technique", "score"]].equals(scores(responses))
-    assert ((found.low <= found.score) & (found.score <= found.high)).all()
-    total = found[found.framing == "overall"].set_index("technique").score
+    assert ((result.low <= result.score) & (result.score <= result.high)).all()
+    total = result[result.framing == "overall"].set_index("technique").score
     assert total.to_dict() == each.groupby("technique").score.sum().to_dict()
     middle = median_intervals(responses, Options(resamples=200))
     assert (middle.n == 15).all() and (

@@ -162,8 +162,10 @@ def test_framings_with_other_techniques_meet_in_overall(write, answer):
         for framing, pair in (("close-up", "ab"), ("head-shot", "bc"))
     ]
     responses = read_responses(write(rows), order="abc")
-    found = panels(responses)["overall"]
-    assert found.items == ("a", "b", "c") and list(zip(found.first, found.second, strict=True)) == [
+    result = panels(responses)["overall"]
+    assert result.items == ("a", "b", "c") and list(
+        zip(result.first, result.second, strict=True)
+    ) == [
         (0, 1),
         (1, 2),
     ]

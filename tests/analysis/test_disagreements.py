@@ -46,7 +46,7 @@ def test_holm_works_on_many_studies_at_once():
 
 def test_simultaneous_intervals_hold_together_as_often_as_they_say():
     """200 studies of 25 people and 10 correlated means: all ten are held 95 % of the time."""
-    held = alone = 0
+    held = unadjusted = 0
     rng, weights = np.random.default_rng(3), None
     for _ in range(200):
         values = rng.normal(0, 1, (25, 10)) + rng.normal(0, 0.7, (25, 1))
@@ -55,17 +55,17 @@ def test_simultaneous_intervals_hold_together_as_often_as_they_say():
         low, high = simultaneous(values.mean(axis=0), weights, np.zeros(10), np.full(10, 25), 0.95)
         held += bool(((low < 0) & (high > 0)).all())
         half = stats.t.ppf(0.975, 24) * values.std(axis=0, ddof=1) / 5
-        alone += bool((np.abs(values.mean(axis=0)) < half).all())
-    assert 178 <= held <= 199 and alone < 160
+        unadjusted += bool((np.abs(values.mean(axis=0)) < half).all())
+    assert 178 <= held <= 199 and unadjusted < 160
 
 
 def test_effect_sizes_have_intervals_that_hold_them(crowd, table):
-    found = pairs(table(crowd(40, [0, 0.4, 0.8], seed=1)), Options(resamples=200))
+    result = pairs(table(crowd(40, [0, 0.4, 0.8], seed=1)), Options(resamples=200))
     for name in ("rank_biserial", "dz"):
-        assert (found[f"{name}_low"] <= found[name]).all()
-        assert (found[name] <= found[f"{name}_high"]).all()
-    wider = found.simultaneous_high - found.simultaneous_low
-    assert (wider > found.high - found.low).all()
+        assert (result[f"{name}_low"] <= result[name]).all()
+        assert (result[name] <= result[f"{name}_high"]).all()
+    wider = result.simultaneous_high - result.simultaneous_low
+    assert (wider > result.high - result.low).all()
 
 
 def test_a_contrast_is_a_cluster_regression(crowd, table):
@@ -73,7 +73,7 @@ def test_a_contrast_is_a_cluster_regression(crowd, table):
     import statsmodels.api as sm
 
     panel = crowd(30, [-0.4, 0, 0.5, 0.2], seed=4, taste=0.5)
-    found = contrasts(table(panel, order="abcd"), Options()).set_index(["a", "b"])
+    result = contrasts(table(panel, order="abcd"), Options()).set_index(["a", "b"])
     x = np.tile((np.eye(4)[panel.second] - np.eye(4)[panel.first])[:, 1:], (30, 1))
     y = panel.preference.ravel().astype(float)
     clusters = np.repeat(np.arange(30), len(panel.first))
@@ -81,9 +81,9 @@ def test_a_contrast_is_a_cluster_regression(crowd, table):
         cov_type="cluster",
         cov_kwds={"groups": clusters, "use_correction": False, "df_correction": False},
     )
-    assert found.estimate["a", "c"] == pytest.approx(fit.params[1])
+    assert result.estimate["a", "c"] == pytest.approx(fit.params[1])
     half = stats.t.ppf(0.975, 29) * fit.bse[1] * np.sqrt(30 / 29)
-    assert found.high["a", "c"] - found.estimate["a", "c"] == pytest.approx(half, rel=1e-5)
+    assert result.high["a", "c"] - result.estimate["a", "c"] == pytest.approx(half, rel=1e-5)
 
 
 def test_interaction_and_any_difference_are_found_and_not_invented(crowd, table):
@@ -94,9 +94,11 @@ def test_interaction_and_any_difference_are_found_and_not_invented(crowd, table)
     same = replace(crowd(30, [-0.6, 0, 0.6], seed=3), framing="head-shot")
     options = Options(resamples=400)
     for other, low, high in ((turned, 0, 0.01), (same, 0.02, 1)):
-        found = omnibus(table(here, other, order="abc"), options).set_index(["framing", "question"])
-        assert low <= found.p["overall", "interaction"] <= high
-        assert found.p["close-up", "techniques"] < 0.01
+        result = omnibus(table(here, other, order="abc"), options).set_index(
+            ["framing", "question"]
+        )
+        assert low <= result.p["overall", "interaction"] <= high
+        assert result.p["close-up", "techniques"] < 0.01
     rng = np.random.default_rng(5)
     small = sum(sign_flip(rng.normal(size=(12, 4)), options, k)[1] <= 0.1 for k in range(200))
     assert 8 <= small <= 35  # of 200 true hypotheses 10 %
@@ -104,8 +106,8 @@ def test_interaction_and_any_difference_are_found_and_not_invented(crowd, table)
 
 def test_worths_that_cannot_add_up_are_said(lines):
     """Everybody goes in a circle: no scale describes it."""
-    found = omnibus(lines(*["a>b b>c c>a"] * 9, *["a>>b b>c c>a"] * 3), Options(resamples=200))
-    by_question = found.set_index("question").p
+    result = omnibus(lines(*["a>b b>c c>a"] * 9, *["a>>b b>c c>a"] * 3), Options(resamples=200))
+    by_question = result.set_index("question").p
     assert by_question["additivity"] < 0.01
 
 
@@ -123,11 +125,11 @@ def test_fatigue_and_carry_over_are_found(write):
             rows.append(
                 f"P{person},3,f{order // 3},{a},{b},{value},{order},{4000 - 100 * order},2024-05-01"
             )
-    found = order_effects(read_responses(write(rows)), Options(resamples=200))
-    found = found.set_index("statistic")
-    assert found.value["strength_slope"] < -0.2 and found.p["strength_slope"] < 0.01
-    assert found.value["carry_over"] > 0.2 and found.p["carry_over"] < 0.01
-    assert found.value["time_slope"] < 0 and found.p["side_slope"] > 0.001
+    result = order_effects(read_responses(write(rows)), Options(resamples=200))
+    result = result.set_index("statistic")
+    assert result.value["strength_slope"] < -0.2 and result.p["strength_slope"] < 0.01
+    assert result.value["carry_over"] > 0.2 and result.p["carry_over"] < 0.01
+    assert result.value["time_slope"] < 0 and result.p["side_slope"] > 0.001
 
 
 def test_every_disagreement_has_its_sentence(crowd, table):
@@ -142,13 +144,13 @@ def test_every_disagreement_has_its_sentence(crowd, table):
         undecided = [
             row for row in rows.itertuples() if inference.verdict(row, 0.05) == "undecided"
         ]
-        alone = [row for row in undecided if row.low > 0 or row.high < 0]
-        if alone:
+        unadjusted = [row for row in undecided if row.low > 0 or row.high < 0]
+        if unadjusted:
             assert "excludes 0 for" in text and "adjusted" in text
         meet = (rows.jod_equivalent == 1).sum()
         if meet:
             assert f"{meet} pair" in text and "the declared margin of 0.8 JOD" in text
-        if alone and meet:
+        if unadjusted and meet:
             return
     raise AssertionError("no study of twenty had a disagreement")
 

@@ -15,8 +15,8 @@ ELSEWHERE = {
 
 
 def test_the_examples_print_what_the_page_says():
-    found = doctest.testfile(str(PAGE), module_relative=False)
-    assert found.attempted > 15 and not found.failed
+    result = doctest.testfile(str(PAGE), module_relative=False)
+    assert result.attempted > 15 and not result.failed
 
 
 def test_every_public_function_is_on_the_page():

@@ -38,7 +38,7 @@ def responses(write, answer):
 
 def bars(ax):
     """Row -> answer (0 to 4) -> (left, width) of the bars that have a width."""
-    found = {}
+    result = {}
     colours = [
         tuple(int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)) for colour in ANSWERS
     ]
@@ -52,11 +52,11 @@ def bars(ax):
                     ]
                 )
             )
-            found.setdefault(round(patch.get_y() + patch.get_height() / 2), {})[answer] = (
+            result.setdefault(round(patch.get_y() + patch.get_height() / 2), {})[answer] = (
                 patch.get_x(),
                 patch.get_width(),
             )
-    return found
+    return result
 
 
 def test_preferences_for_the_panels_technique_lie_on_the_left(responses):
@@ -186,11 +186,11 @@ def test_no_figure_is_taller_than_a_page_and_no_letter_below_7_points(
         [(level, one, 0.5, 0.2, 0.7) for level in levels for one in worth_figures.DRAWN],
         columns=["framing", "statistic", "value", "low", "high"],
     )
-    found = {
+    result = {
         level: Priorities(np.full(len(items[level]), 1 / len(items[level])), 5.0, 0.0, None)
         for level in items
     }
-    figures.draw_responses(responses, found, tuple(names[:2]), file_names(items))
+    figures.draw_responses(responses, result, tuple(names[:2]), file_names(items))
     worth_figures.draw_pairs(pairs, book, 0.25)
     worth_figures.draw_ladder(worths, book)
     worth_figures.draw_worths(worths, book)

@@ -164,8 +164,8 @@ def test_families(three, table):
 
 
 def test_overall_takes_the_mean_of_a_person_over_framings(three, table):
-    found = pairs(table(*three, order="abcd"), FAST)
-    overall = found[found.framing == "overall"].iloc[0]
+    result = pairs(table(*three, order="abcd"), FAST)
+    overall = result[result.framing == "overall"].iloc[0]
     mine = np.mean([panel.preference[:, 0] for panel in three], axis=0)
     assert (
         overall.n == 20
@@ -179,14 +179,14 @@ def test_overall_takes_the_mean_of_a_person_over_framings(three, table):
 
 def test_equivalent_needs_test_and_interval_within_the_margin(crowd, table):
     panel = crowd(80, [0, 0, 2], seed=1)
-    found = pairs(table(panel, order="abc"), replace(FAST, margin=0.5, margin_jod=0.7)).set_index(
+    result = pairs(table(panel, order="abc"), replace(FAST, margin=0.5, margin_jod=0.7)).set_index(
         ["a", "b"]
     )
-    assert found.equivalent.to_dict() == {("a", "b"): 1, ("a", "c"): 0, ("b", "c"): 0}
-    same = found.loc[("a", "b")]
+    assert result.equivalent.to_dict() == {("a", "b"): 1, ("a", "c"): 0, ("b", "c"): 0}
+    same = result.loc[("a", "b")]
     assert same.tost_p < 0.05 and -0.5 < same.equivalence_low < same.equivalence_high < 0.5
     assert same.low < same.equivalence_low and same.equivalence_high < same.high  # 95 % about 90 %
-    assert same.jod_equivalent == 1 and found.jod_equivalent[("a", "c")] == 0
+    assert same.jod_equivalent == 1 and result.jod_equivalent[("a", "c")] == 0
     strict = (
         pairs(table(panel, order="abc"), replace(FAST, margin=0.01))
         .set_index(["a", "b"])
@@ -225,28 +225,28 @@ def test_other_sides_orders_and_twice_the_people(three, table):
 
 
 def test_few_people_and_missing_answers(crowd, table):
-    found = pairs(table(crowd(4, [0, 1, 2], seed=1)), replace(FAST, margin=0.5))
-    assert found[["wilcoxon_p", "sign_p", "holm_p", "tost_p", "low", "high"]].isna().all(axis=None)
-    assert (found.equivalent == 0).all()
-    assert found.mean_preference.notna().all() and any(
-        "4 participants, no test" in note for note in found.attrs["notes"]
+    result = pairs(table(crowd(4, [0, 1, 2], seed=1)), replace(FAST, margin=0.5))
+    assert result[["wilcoxon_p", "sign_p", "holm_p", "tost_p", "low", "high"]].isna().all(axis=None)
+    assert (result.equivalent == 0).all()
+    assert result.mean_preference.notna().all() and any(
+        "4 participants, no test" in note for note in result.attrs["notes"]
     )
     panel = crowd(20, [0, 1, 2], seed=1)
     holes = panel.preference.copy()
     holes[:16, 0] = MISSING
     holes[:, 1] = MISSING
-    found = pairs(table(replace(panel, preference=holes), order="abc"), FAST)
-    assert found[["a", "b", "n"]].to_numpy().tolist() == [["a", "b", 4], ["b", "c", 20]]
-    assert np.isnan(found.wilcoxon_p[0]) and found.holm_p[1] == found.wilcoxon_p[1]
+    result = pairs(table(replace(panel, preference=holes), order="abc"), FAST)
+    assert result[["a", "b", "n"]].to_numpy().tolist() == [["a", "b", 4], ["b", "c", 20]]
+    assert np.isnan(result.wilcoxon_p[0]) and result.holm_p[1] == result.wilcoxon_p[1]
 
 
 def test_all_alike_has_no_tost(lines):
-    found = pairs(lines(*["a=b"] * 8), replace(FAST, margin=0.5)).iloc[0]
+    result = pairs(lines(*["a=b"] * 8), replace(FAST, margin=0.5)).iloc[0]
     assert (
-        np.isnan(found.tost_p)
-        and found.equivalent == 0
-        and found.wilcoxon_p == 1
-        and found.mean_preference == 0
+        np.isnan(result.tost_p)
+        and result.equivalent == 0
+        and result.wilcoxon_p == 1
+        and result.mean_preference == 0
     )
 
 
@@ -256,24 +256,24 @@ def test_all_alike_has_no_tost(lines):
 
 def test_the_trend_has_the_slope_of_the_tallies_and_scipys_page(three, table):
     responses = table(*three)
-    found = trend(responses, FAST).set_index("statistic")
-    assert found.value["slope_total"] == pytest.approx(
+    result = trend(responses, FAST).set_index("statistic")
+    assert result.value["slope_total"] == pytest.approx(
         tallies.trend(tallies.totals(responses)).slope
     )
     strength = np.array([np.abs(panel.preference).mean(axis=1) for panel in three]).T
     slopes = [np.polyfit([1, 2, 3], one, 1)[0] for one in strength]
-    assert found.value["slope_strength"] == pytest.approx(np.mean(slopes)) and found.p[
+    assert result.value["slope_strength"] == pytest.approx(np.mean(slopes)) and result.p[
         "slope_strength"
     ] == pytest.approx(signed_rank(slopes)[0])
-    assert found.value["page_l"] == pytest.approx(
+    assert result.value["page_l"] == pytest.approx(
         stats.page_trend_test(-strength, method="asymptotic").statistic
     )
-    assert found.p["page_l"] < 1e-4 and found.high["slope_total"] < 0
+    assert result.p["page_l"] < 1e-4 and result.high["slope_total"] < 0
 
 
 def test_two_framings_have_no_trend(three, table):
-    found = trend(table(*three[:2]), FAST)
-    assert found.empty and "needs 3" in found.attrs["notes"][0]
+    result = trend(table(*three[:2]), FAST)
+    assert result.empty and "needs 3" in result.attrs["notes"][0]
 
 
 def test_familiarity_that_changes_preference_is_found(crowd, table):
@@ -282,42 +282,45 @@ def test_familiarity_that_changes_preference_is_found(crowd, table):
     moved = panel.preference.copy()
     for person, name in enumerate(panel.participants):
         moved[person, 0] = np.clip(3 - level[name], -2, 2)  # novices prefer b, experts a
-    found = familiarity_interaction(
+    result = familiarity_interaction(
         table(replace(panel, preference=moved), familiarity=level, order="abc"),
         replace(FAST, resamples=999),
     )
-    found = found.set_index("technique")
+    result = result.set_index("technique")
     assert (
-        found.p[""] < 0.01 and found.p["a"] < 0.01 and found.p["b"] < 0.01 and found.p["c"] > 0.01
+        result.p[""] < 0.01
+        and result.p["a"] < 0.01
+        and result.p["b"] < 0.01
+        and result.p["c"] > 0.01
     )
-    assert found.spearman["a"] > 0.4 > -0.4 > found.spearman["b"] and found.low["a"] > 0
+    assert result.spearman["a"] > 0.4 > -0.4 > result.spearman["b"] and result.low["a"] > 0
     net, asked = net_scores(replace(panel, preference=moved))
     x = np.array([level[name] for name in panel.participants])
-    assert found.spearman["a"] == pytest.approx(
+    assert result.spearman["a"] == pytest.approx(
         stats.spearmanr(x, net[:, 0] / asked[:, 0]).statistic
     )
-    assert found.slope["a"] == pytest.approx(stats.linregress(x, net[:, 0] / asked[:, 0]).slope)
-    assert found.p["c"] == pytest.approx(stats.spearmanr(x, net[:, 2]).pvalue, abs=0.05)
+    assert result.slope["a"] == pytest.approx(stats.linregress(x, net[:, 0] / asked[:, 0]).slope)
+    assert result.p["c"] == pytest.approx(stats.spearmanr(x, net[:, 2]).pvalue, abs=0.05)
 
 
 def test_familiarity_says_what_it_could_not_have_found(three, table):
     responses = table(
         *three, familiarity={name: 1 + k % 5 for k, name in enumerate(three[0].participants)}
     )
-    found = familiarity_interaction(responses, FAST)
+    result = familiarity_interaction(responses, FAST)
     # n for a correlation of 0.6 with a power of 0.8: 19 by G*Power's tables for Pearson; Spearman
     # needs some 6 % more beyond 3
-    assert found.detectable.between(0.58, 0.62).all() and (found.n == 20).all()
+    assert result.detectable.between(0.58, 0.62).all() and (result.n == 20).all()
     assert any(
         "0.3 with familiarity is found with a probability of 0.2" in note
-        for note in found.attrs["notes"]
+        for note in result.attrs["notes"]
     )
 
 
 def test_familiarity_that_does_not_vary_says_nothing(three, table):
-    found = familiarity_interaction(table(*three), FAST)
-    assert found.empty and any(
-        "all rated their familiarity 3" in note for note in found.attrs["notes"]
+    result = familiarity_interaction(table(*three), FAST)
+    assert result.empty and any(
+        "all rated their familiarity 3" in note for note in result.attrs["notes"]
     )
     few = familiarity_interaction(table(three[0].chosen(np.arange(3))), FAST)
     assert few.empty and any(

@@ -216,10 +216,10 @@ def test_long_names_stay_in_their_columns():
     rows = tuple((name.format(k), name.format(f"{k}0"), *("0.50 [0.10, 0.90]",) * 4) for k in "123")
     columns = ("A", "B", "Rank-biserial", "Standardised mean", "Contrast, points", "Holm p")
     table = Shown("x", "", columns, (False, False, True, True, True, True), rows)
-    found = text_of(pdf.make("t", "= x", [], [], [table], [], [], [], False), "-bbox")
+    result = text_of(pdf.make("t", "= x", [], [], [table], [], [], [], False), "-bbox")
     box = r'xMin="([\d.]+)" yMin="([\d.]+)" xMax="([\d.]+)"'
     lines: dict[str, list[tuple[float, float]]] = {}
-    for left, top, right in re.findall(box, found):
+    for left, top, right in re.findall(box, result):
         lines.setdefault(top, []).append((float(left), float(right)))
     assert any(len(words) > 8 for words in lines.values())
     for words in lines.values():
@@ -283,16 +283,16 @@ def test_objective_figures_tables_and_sentences_are_there(study_report):
 
 
 def test_declared_choices_become_options_and_the_command_line_wins():
-    found = declared.options(
+    result = declared.options(
         {"margin": 0.3, "test": "sign", "exclusions": {"zeta": 0.5, "median_rt_ms": False}},
         margin=0.2,
         seed=None,
     )
-    assert (found.margin, found.test, found.seed) == (0.2, "sign", 0)
+    assert (result.margin, result.test, result.seed) == (0.2, "sign", 0)
     assert (
-        found.exclusions.zeta == 0.5
-        and found.exclusions.median_rt_ms is None
-        and found.exclusions.one_side_share == 0.9
+        result.exclusions.zeta == 0.5
+        and result.exclusions.median_rt_ms is None
+        and result.exclusions.one_side_share == 0.9
     )
     assert declared.options({}) == Options()
 
@@ -328,11 +328,11 @@ def manifest(tmp_path, images):
 
 
 def test_what_the_manifest_does_not_hold_is_said_and_nothing_is_made_up(tmp_path):
-    found = objective.read_measures(
+    result = objective.read_measures(
         manifest(tmp_path, [{"framing": "x", "technique": "a", "parameters": {"samples": 22}}])
     )
-    assert found.table.empty
-    text = " ".join(found.notes)
+    assert result.table.empty
+    text = " ".join(result.notes)
     assert (
         "No condition is called 'reference'" in text
         and "no samples a scattering pixel and no milliseconds an image" in text
@@ -344,9 +344,9 @@ def test_measures_are_read_and_partial_ones_are_said(tmp_path):
         {"framing": "x", "technique": "a", "measures": {"milliseconds": 2}},
         {"framing": "x", "technique": "b"},
     ]
-    found = objective.read_measures(manifest(tmp_path, images))
-    assert found.table.to_numpy().tolist() == [["x", "a", "milliseconds", 2.0, "manifest"]]
-    assert "1 of 2 images in the manifest have no milliseconds an image." in found.notes
+    result = objective.read_measures(manifest(tmp_path, images))
+    assert result.table.to_numpy().tolist() == [["x", "a", "milliseconds", 2.0, "manifest"]]
+    assert "1 of 2 images in the manifest have no milliseconds an image." in result.notes
 
 
 @pytest.mark.parametrize(
@@ -397,8 +397,8 @@ def test_distances_to_the_reference_come_from_the_images(tmp_path):
         images.append({"framing": "x", "technique": name, "file": f"{name}.png"})
     table = objective.read_measures(manifest(tmp_path, images)).table
     for measure in ("dssim", "flip"):
-        found = table[table.measure == measure].set_index("technique").value
-        assert 0 < found["near"] < found["far"] < 1 and "reference" not in found
+        result = table[table.measure == measure].set_index("technique").value
+        assert 0 < result["near"] < result["far"] < 1 and "reference" not in result
     assert not objective.read_measures(tmp_path, reference="near").table.empty
     (tmp_path / "far.png").unlink()
     assert "not beside the manifest" in " ".join(objective.read_measures(tmp_path).notes)

@@ -211,15 +211,15 @@ def test_power_decides_as_analyse_does(design, test, family):
             difference,
         )
         for people in (12, 60):
-            found, excluded = run.found(people), run.excluded(people)
+            result, excluded = run.found(people), run.excluded(people)
             for study in range(0, 50, 10 if people > 20 else 5):
                 rows = pairs(table_of(run, study, people), options)
                 about = rows[(rows.a == "a") & (rows.b == "b") & (rows.framing != "overall")]
                 verdicts = [verdict(row, 0.05) for row in about.itertuples()]
-                assert [one in ("different", "both") for one in verdicts] == list(found[study])
+                assert [one in ("different", "both") for one in verdicts] == list(result[study])
                 assert [one in ("equivalent", "both") for one in verdicts] == list(excluded[study])
         if design == "full" and people == 60:
-            assert (found if difference else excluded).any()
+            assert (result if difference else excluded).any()
 
 
 @pytest.mark.parametrize(("difference", "goal"), [(1.6, "find"), (0.0, "exclude")])
@@ -289,9 +289,9 @@ def test_an_adaptive_design_that_saves_nobody_is_said(people, said):
         ],
         columns=["framing", "design", "goal", "test", "correction", "people"],
     )
-    found = _adaptive(Plan(THESIS, PAIR), needed, None)
-    assert len(found) == (1 if said else 0)
-    assert all(f"no better than pairs drawn by lot: {said}" in sentence for sentence in found)
+    result = _adaptive(Plan(THESIS, PAIR), needed, None)
+    assert len(result) == (1 if said else 0)
+    assert all(f"no better than pairs drawn by lot: {said}" in sentence for sentence in result)
 
 
 def test_the_adaptive_design_asks_near_pairs_more_often_than_far_ones():
@@ -314,7 +314,7 @@ def test_the_adaptive_design_asks_near_pairs_more_often_than_far_ones():
 def test_more_people_larger_differences_and_more_answers_give_more_power():
     people = people_grid(120)[8]
     curves, _ = plan_table(plan(), ("full", "incomplete"))
-    found = (
+    result = (
         curves[
             (curves.goal == "find")
             & (curves.test == "contrast")
@@ -324,7 +324,7 @@ def test_more_people_larger_differences_and_more_answers_give_more_power():
         .set_index("design")
         .power
     )
-    assert found["full"] > found["incomplete"]
+    assert result["full"] > result["incomplete"]
     larger, _ = plan_table(plan(difference=1.6), ("full",))
     more = larger[
         (larger.goal == "find")
@@ -332,7 +332,7 @@ def test_more_people_larger_differences_and_more_answers_give_more_power():
         & (larger.people == people)
         & (larger.correction == "none")
     ].power.iloc[0]
-    assert more > found["full"]
+    assert more > result["full"]
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_one_others():
@@ -372,9 +372,9 @@ def test_a_pilot_gives_back_what_it_was_drawn_from(write):
         for person in range(400)
         for k, (a, b) in enumerate(truth.pairs)
     ]
-    found, answering = fit_pilot(read_responses(write(rows)))
+    result, answering = fit_pilot(read_responses(write(rows)))
     expected = truth.truth("close-up", 0.4)
-    assert [found["close-up"][name] for name in THESIS] == pytest.approx(expected, abs=0.25)
+    assert [result["close-up"][name] for name in THESIS] == pytest.approx(expected, abs=0.25)
     assert (answering.slight, answering.clear) == pytest.approx((0.6, 1.7), abs=0.15)
 
 

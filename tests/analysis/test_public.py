@@ -95,8 +95,8 @@ def test_a_low_cr_is_set_against_chance(crowd, table):
     rng, low, shares = np.random.default_rng(0), 0, []
     for seed in range(12):
         panel = crowd(20, [0, 0, 0, 0, 0], seed=seed)
-        found = consistency_intervals(table(panel, order="abcde"), Options(resamples=200))
-        row = found[found.aggregation == "median"].iloc[0]
+        result = consistency_intervals(table(panel, order="abcde"), Options(resamples=200))
+        row = result[result.aggregation == "median"].iloc[0]
         low += row.cr < 0.1
         shares.append(row.chance_share)
     assert low >= 10 and 0.2 < np.mean(shares) < 0.9
@@ -123,15 +123,15 @@ def test_images_are_a_sample_too(crowd, table):
         replace(crowd(30, [-0.8, 0, 0.1 * k], seed=k), framing=name)
         for k, name in enumerate(framings)
     ]
-    found = by_images(table(*panels, order="abc"), Options()).set_index(["a", "b"])
+    result = by_images(table(*panels, order="abc"), Options()).set_index(["a", "b"])
     means = [
         pairs(table(one, order="abc"), Options(resamples=100)).set_index(["a", "b"])
         for one in panels
     ]
     values = [one.mean_preference["a", "b"] for one in means]
     test = stats.ttest_1samp(values, 0)
-    assert found.p["a", "b"] == pytest.approx(test.pvalue)
-    assert found.images["a", "b"] == 4 and found.least["a", "b"] == pytest.approx(min(values))
+    assert result.p["a", "b"] == pytest.approx(test.pvalue)
+    assert result.images["a", "b"] == 4 and result.least["a", "b"] == pytest.approx(min(values))
     assert by_images(table(panels[0]), Options()).empty
 
 

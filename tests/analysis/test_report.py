@@ -275,8 +275,8 @@ def test_rejected_rows_are_in_the_table_and_on_the_page(undrawn, write, answer):
         "short",
     ]
     files = report_responses(read_responses(write(rows)))
-    found = table(files, "rejected_rows")
-    assert found.line.tolist() == [3, 4] and found.row[1] == "short"
+    result = table(files, "rejected_rows")
+    assert result.line.tolist() == [3, 4] and result.row[1] == "short"
     html = files["report.html"].decode()
     assert "P&lt;b&gt;2" in html and "P<b>2" not in html
     text = Page(html).text
@@ -312,11 +312,11 @@ def test_eleven_techniques_have_priorities_and_no_ratio(undrawn, write, random_s
     files = report_responses(
         read_responses(write(random_study(1, framings=["close-up"], techniques=techniques)))
     )
-    found = table(files, "ahp_priorities")
+    result = table(files, "ahp_priorities")
     assert (
-        found.priority.sum() == pytest.approx(1)
-        and found.cr.isna().all()
-        and found.ci.notna().all()
+        result.priority.sum() == pytest.approx(1)
+        and result.cr.isna().all()
+        and result.ci.notna().all()
     )
     assert "no random index beyond 10" in Page(files["report.html"].decode()).text
 
@@ -403,12 +403,12 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch)
 
 def test_matrices_give_the_published_priorities_in_the_table():
     files = report_matrices(read_matrices(MATRICES), "thesis_matrices.toml")
-    found = table(files, "ahp_priorities").set_index(["framing", "technique"])
+    result = table(files, "ahp_priorities").set_index(["framing", "technique"])
     # Vuletic's thesis, tables 5.2 and 5.4
-    assert found.priority["close-up"].tolist() == pytest.approx(
+    assert result.priority["close-up"].tolist() == pytest.approx(
         [0.0841, 0.1208, 0.2766, 0.3562, 0.1623], abs=1e-4
     )
-    assert found.cr["half-length", "none"] == pytest.approx(0.0153, abs=1e-4)
+    assert result.cr["half-length", "none"] == pytest.approx(0.0153, abs=1e-4)
     text = " ".join(Page(files["report.html"].decode()).text.split())
     assert "head-shot: highest priority for golubev and golubev_plus, 0.284." in text
     assert "that of items in thesis_matrices.toml" in text

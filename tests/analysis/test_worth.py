@@ -66,9 +66,9 @@ def test_bradley_terry_gives_agrestis_baseball():
     """Published: Milwaukee 1.58, Detroit 1.44, Toronto 1.29, New York 1.25, Boston 1.11, Cleveland
     0.68, Baltimore 0.
     """
-    found = bradley_terry(BASEBALL)
-    assert found - found[-1] == pytest.approx([1.58, 1.44, 1.29, 1.25, 1.11, 0.68, 0], abs=0.005)
-    assert found.sum() == pytest.approx(0, abs=1e-12)
+    result = bradley_terry(BASEBALL)
+    assert result - result[-1] == pytest.approx([1.58, 1.44, 1.29, 1.25, 1.11, 0.68, 0], abs=0.005)
+    assert result.sum() == pytest.approx(0, abs=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -122,8 +122,8 @@ def test_davidson_maximises_its_likelihood_of_the_puddings():
         ).sum()
 
     best = optimize.minimize(loss, np.zeros(6), method="BFGS", options={"gtol": 1e-8}).x
-    found, log_nu = davidson(won, level)
-    assert found - found[0] == pytest.approx(
+    result, log_nu = davidson(won, level)
+    assert result - result[0] == pytest.approx(
         np.append(0, best[:5]), abs=1e-5
     ) and log_nu == pytest.approx(best[5], abs=1e-5)
 
@@ -139,8 +139,8 @@ def test_davidson_orders_a_balanced_design_by_points_and_is_bradley_terry_withou
         for one in (davidson(won, level)[0], (2 * won + level).sum(axis=1))
     ]
     assert np.array_equal(*ranks)
-    found, log_nu = davidson(BASEBALL, np.zeros((7, 7)))
-    assert found == pytest.approx(bradley_terry(BASEBALL)) and log_nu == -np.inf
+    result, log_nu = davidson(BASEBALL, np.zeros((7, 7)))
+    assert result == pytest.approx(bradley_terry(BASEBALL)) and log_nu == -np.inf
 
 
 def test_many_matrices_at_once_are_as_one_by_one():
@@ -180,13 +180,13 @@ def test_ordinal_without_people_is_an_ordered_logit_of_answers_seen_from_both_si
         preference=np.concatenate([panel.preference] * 2),
         first_left=np.concatenate([panel.first_left, ~panel.first_left]),
     )
-    found = ordinal(both, mixed=False)
-    assert found.worth == pytest.approx(expected - expected.mean(), abs=1e-4)
-    assert found.side == pytest.approx(0, abs=1e-6)
+    result = ordinal(both, mixed=False)
+    assert result.worth == pytest.approx(expected - expected.mean(), abs=1e-4)
+    assert result.side == pytest.approx(0, abs=1e-6)
     cuts = fit.model.transform_threshold_params(fit.params)[1:-1]
-    assert found.thresholds == pytest.approx(cuts[2:], abs=1e-4)
-    assert found.log_likelihood == pytest.approx(fit.llf, abs=1e-4)
-    assert found.errors == pytest.approx(_centred_errors(fit, 4), rel=1e-3)
+    assert result.thresholds == pytest.approx(cuts[2:], abs=1e-4)
+    assert result.log_likelihood == pytest.approx(fit.llf, abs=1e-4)
+    assert result.errors == pytest.approx(_centred_errors(fit, 4), rel=1e-3)
 
 
 def _centred_errors(fit, n):
@@ -324,15 +324,15 @@ def estimates(responses, options=None):
 
 
 def test_worths_have_their_columns_and_centre_on_0_within_a_framing(study, table):
-    found = worths(table(study, replace(study, framing="head-shot")), Options(resamples=100))
-    assert list(found.columns) == [
+    result = worths(table(study, replace(study, framing="head-shot")), Options(resamples=100))
+    assert list(result.columns) == [
         *("framing", "model", "technique", "estimate", "low", "high", "fit")
     ]
-    assert set(found.fit) == {"maximum likelihood"}
-    assert list(dict.fromkeys(found.model)) == list(MODELS)
-    assert list(dict.fromkeys(found.framing)) == ["close-up", "head-shot", "overall"]
-    assert found.groupby(["framing", "model"]).estimate.sum().abs().max() < 1e-8
-    assert (found.low < found.estimate).all() and (found.estimate < found.high).all()
+    assert set(result.fit) == {"maximum likelihood"}
+    assert list(dict.fromkeys(result.model)) == list(MODELS)
+    assert list(dict.fromkeys(result.framing)) == ["close-up", "head-shot", "overall"]
+    assert result.groupby(["framing", "model"]).estimate.sum().abs().max() < 1e-8
+    assert (result.low < result.estimate).all() and (result.estimate < result.high).all()
 
 
 def test_other_sides_change_nothing_but_the_side_effect(study, table):
@@ -407,36 +407,36 @@ REFUSED = {
 def test_a_fit_that_does_not_exist_is_named_and_not_invented(lines, reason):
     responses = lines(*(REFUSED | UNBEATEN)[reason])
     options = Options(resamples=100, fallback="none" if reason in UNBEATEN else "reduced_bias")
-    found = worths(responses, options)
-    assert found[["estimate", "low", "high"]].isna().all(axis=None) and len(found) == 4 * len(
+    result = worths(responses, options)
+    assert result[["estimate", "low", "high"]].isna().all(axis=None) and len(result) == 4 * len(
         responses.items["close-up"]
     )
     assert all(
         any(
             f"close-up, {model}: no finite worths" in note and reason in note
-            for note in found.attrs["notes"]
+            for note in result.attrs["notes"]
         )
         for model in MODELS
     )
-    assert worth.parameters(responses, options).empty and set(found.fit) == {""}
+    assert worth.parameters(responses, options).empty and set(result.fit) == {""}
 
 
 @pytest.mark.parametrize("reason", UNBEATEN)
 def test_an_unbeaten_technique_has_a_marked_fit_and_an_open_interval(lines, reason):
     """No panel disappears; and resampling a technique that always won must not make it certain."""
     responses = lines(*UNBEATEN[reason])
-    found = worths(responses, Options(resamples=100))
-    assert found[["estimate", "low", "high"]].notna().all(axis=None)
-    assert set(found.fit) == {"reduced bias", "weak prior"}
+    result = worths(responses, Options(resamples=100))
+    assert result[["estimate", "low", "high"]].notna().all(axis=None)
+    assert set(result.fit) == {"reduced bias", "weak prior"}
     assert all(
         any(
             f"{model}: maximum likelihood has no finite worths" in note and reason in note
-            for note in found.attrs["notes"]
+            for note in result.attrs["notes"]
         )
         for model in MODELS
     )
-    assert ((found.high - found.estimate) > 0.3).all() and (found.high < 12).all()
-    assert ((found.estimate - found.low) > 0.3).all() and (found.low > -12).all()
+    assert ((result.high - result.estimate) > 0.3).all() and (result.high < 12).all()
+    assert ((result.estimate - result.low) > 0.3).all() and (result.low > -12).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -473,8 +473,8 @@ def test_reduced_bias_is_the_maximum_of_jeffreys_penalised_likelihood(seed):
             return -fit - 0.5 * np.linalg.slogdet(information)[1]
 
         best = optimize.minimize(loss, np.zeros(size), options={"gtol": 1e-7}).x
-        found, log_nu = davidson(won, ties, reduced_bias=True)
-        assert found == pytest.approx(basis @ best[:3], abs=1e-4)
+        result, log_nu = davidson(won, ties, reduced_bias=True)
+        assert result == pytest.approx(basis @ best[:3], abs=1e-4)
         assert np.isnan(davidson(won, ties)[0]).all()
         if size == 4:
             assert log_nu == pytest.approx(best[3], abs=1e-4)
@@ -482,8 +482,8 @@ def test_reduced_bias_is_the_maximum_of_jeffreys_penalised_likelihood(seed):
 
 def test_reduced_bias_of_one_pair_is_half_an_answer_for_each():
     """One logit: Jeffreys' prior adds half a win on each side."""
-    found = bradley_terry([[0, 20], [0, 0]], reduced_bias=True)
-    assert found[0] - found[1] == pytest.approx(np.log(20.5 / 0.5))
+    result = bradley_terry([[0, 20], [0, 0]], reduced_bias=True)
+    assert result[0] - result[1] == pytest.approx(np.log(20.5 / 0.5))
     assert np.diff(thurstone_jod([[0, 0], [20, 0]], reduced_bias=True)) > 2
 
 
@@ -497,9 +497,9 @@ def test_a_tie_is_neither_a_defeat_nor_the_want_of_one(lines):
         assert missing_fit(panel, model) is None
         assert missing_fit(panel, model, "drop") == "a was never beaten by b, c"
     assert missing_fit(panel, "davidson") is None and missing_fit(panel, "ordinal") is None
-    found = worths(responses, Options(resamples=100)).set_index(["model", "technique"])
-    assert found.estimate["davidson", "a"] > found.estimate["davidson", "b"]
-    assert found.fit["bradley_terry", "a"] == "maximum likelihood"
+    result = worths(responses, Options(resamples=100)).set_index(["model", "technique"])
+    assert result.estimate["davidson", "a"] > result.estimate["davidson", "b"]
+    assert result.fit["bradley_terry", "a"] == "maximum likelihood"
     dropped = worths(responses, Options(resamples=100, ties="drop"))
     assert set(dropped[dropped.model == "bradley_terry"].fit) == {"reduced bias"}
 
@@ -518,46 +518,46 @@ def test_tastes_that_grow_without_end_are_refused(crowd, table):
     """Twenty people with strong tastes, three answers each: among 40 such studies one at least has
     no maximum.
     """
-    found = next(
+    result = next(
         worths(table(other), Options(resamples=100, models=("ordinal",)))
         for other in (
             crowd(20, [-1, -2, 2], seed=seed, taste=6.0, cuts=(2.0, 4.0)) for seed in range(40)
         )
         if ordinal(other) is None and missing_fit(other, "ordinal") is None
     )
-    assert "can grow together without end" in found.attrs["notes"][0]
-    assert set(found.fit) == {"weak prior"} and found.estimate.notna().all()
+    assert "can grow together without end" in result.attrs["notes"][0]
+    assert set(result.fit) == {"weak prior"} and result.estimate.notna().all()
 
 
 def test_two_techniques_have_the_log_odds(lines):
-    found = (
+    result = (
         worths(lines(*["a>b"] * 12, *["a<<b"] * 4), Options(resamples=100))
         .set_index(["model", "technique"])
         .estimate
     )
-    assert found["bradley_terry", "a"] - found["bradley_terry", "b"] == pytest.approx(np.log(3))
-    assert found["davidson", "a"] - found["davidson", "b"] == pytest.approx(np.log(3))
-    assert found["thurstone_jod", "a"] - found["thurstone_jod", "b"] == pytest.approx(1)
+    assert result["bradley_terry", "a"] - result["bradley_terry", "b"] == pytest.approx(np.log(3))
+    assert result["davidson", "a"] - result["davidson", "b"] == pytest.approx(np.log(3))
+    assert result["thurstone_jod", "a"] - result["thurstone_jod", "b"] == pytest.approx(1)
 
 
 def test_few_people_get_no_interval_and_one_no_ordinal_model(lines):
-    found = worths(lines("a>b b>c a<c"), Options(resamples=100))
-    rest = found[found.model != "ordinal"]
-    assert rest.estimate.notna().all() and found[["low", "high"]].isna().all(axis=None)
-    assert found[found.model == "ordinal"].estimate.isna().all()
-    assert any("needs 5" in note for note in found.attrs["notes"])
+    result = worths(lines("a>b b>c a<c"), Options(resamples=100))
+    rest = result[result.model != "ordinal"]
+    assert rest.estimate.notna().all() and result[["low", "high"]].isna().all(axis=None)
+    assert result[result.model == "ordinal"].estimate.isna().all()
+    assert any("needs 5" in note for note in result.attrs["notes"])
 
 
 def test_intervals_survive_resamples_without_a_fit(lines):
     """a is beaten by one person in six: a third of the resamples leave that one out."""
     responses = lines(*["a>b b>c a>c"] * 2, *["a>b b<c a>c"] * 3, "a<b b<c a<c")
-    found = worths(responses, Options(resamples=200, models=("bradley_terry",)))
-    assert found[["estimate", "low", "high"]].notna().all(axis=None)
-    assert (found.low > -6).all() and (found.high < 6).all()
-    assert set(found.fit) == {"maximum likelihood"}
+    result = worths(responses, Options(resamples=200, models=("bradley_terry",)))
+    assert result[["estimate", "low", "high"]].notna().all(axis=None)
+    assert (result.low > -6).all() and (result.high < 6).all()
+    assert set(result.fit) == {"maximum likelihood"}
     assert any(
         "resamples: the interval is that of worths with reduced bias" in note
-        for note in found.attrs["notes"]
+        for note in result.attrs["notes"]
     )
     refused = worths(responses, Options(resamples=200, models=("bradley_terry",), fallback="none"))
     assert refused[["low", "high"]].isna().all(axis=None)
@@ -572,8 +572,8 @@ def test_davidson_with_a_side_finds_it():
         d = truth[i] - truth[j] + side
         p = special.softmax([d / 2, -d / 2, log_nu])
         counts[i, j] = rng.multinomial(4000, p)
-    found, found_nu, found_side = davidson_sides(counts)
-    assert found == pytest.approx(truth, abs=0.05)
+    result, found_nu, found_side = davidson_sides(counts)
+    assert result == pytest.approx(truth, abs=0.05)
     assert found_nu == pytest.approx(log_nu, abs=0.05)
     assert found_side == pytest.approx(side, abs=0.05)
     both = counts + np.swapaxes(counts, 0, 1)[..., [1, 0, 2]]
@@ -598,27 +598,27 @@ def test_standard_errors_are_statsmodels():
 
 def test_the_deviance_is_that_of_the_regression(crowd, table):
     panel = crowd(40, [-0.5, 0, 0.3, 0.6], seed=2, cuts=(0.0, 2.0))
-    found = worth.goodness(table(panel, order="abcd"), Options()).set_index("model")
+    result = worth.goodness(table(panel, order="abcd"), Options()).set_index("model")
     i, j = np.triu_indices(4, 1)
     won = wins(panel, panel.counts)
     x = (np.eye(4)[i] - np.eye(4)[j])[:, :-1]
     fit = sm.GLM(np.column_stack([won[i, j], won[j, i]]), x, family=sm.families.Binomial()).fit()
-    assert found.deviance["bradley_terry"] == pytest.approx(fit.deviance)
-    assert found.df["bradley_terry"] == 3
-    assert found.p["bradley_terry"] == pytest.approx(stats.chi2.sf(fit.deviance, 3))
+    assert result.deviance["bradley_terry"] == pytest.approx(fit.deviance)
+    assert result.df["bradley_terry"] == 3
+    assert result.p["bradley_terry"] == pytest.approx(stats.chi2.sf(fit.deviance, 3))
 
 
 def test_eleven_techniques(crowd, table):
-    found = worths(table(crowd(12, np.linspace(-1, 1, 11), seed=1)), Options(resamples=100))
-    assert len(found) == 44 and found.estimate.notna().all()
+    result = worths(table(crowd(12, np.linspace(-1, 1, 11), seed=1)), Options(resamples=100))
+    assert len(result) == 44 and result.estimate.notna().all()
 
 
 def test_strong_connection_is_a_chain_of_wins_between_any_two():
     rng = np.random.default_rng(3)
     matrices = (rng.random((200, 6, 6)) < 0.25) * (1 - np.eye(6))
-    for matrix, found in zip(matrices, worth.strongly_connected(matrices), strict=True):
+    for matrix, result in zip(matrices, worth.strongly_connected(matrices), strict=True):
         reach = np.linalg.matrix_power(matrix + np.eye(6), 6) > 0
-        assert found == all(reach[i, j] and reach[j, i] for i, j in combinations(range(6), 2))
+        assert result == all(reach[i, j] and reach[j, i] for i, j in combinations(range(6), 2))
 
 
 def test_jod_sigma_is_the_textbooks():

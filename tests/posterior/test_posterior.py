@@ -102,18 +102,18 @@ def test_what_answers_were_drawn_from_comes_back(drawn):
 
 
 def test_a_new_image_is_less_certain_than_those_seen(drawn):
-    found = drawn.worths().assign(width=lambda rows: rows.high - rows.low)
-    width = found.groupby("framing").width.mean()
+    result = drawn.worths().assign(width=lambda rows: rows.high - rows.low)
+    width = result.groupby("framing").width.mean()
     assert width["new image"] > width["overall"] > width["image0"]
-    assert found.groupby("framing").p_best.sum().to_numpy() == pytest.approx(1)
+    assert result.groupby("framing").p_best.sum().to_numpy() == pytest.approx(1)
 
 
 def test_one_image_says_nothing_of_others_and_is_near_maximum_likelihood():
     """120 people: the priors pull by less than half of the fit's standard errors."""
     table = answers(120, [[0.0, 0.0, 0.0]], 5)
-    found = sample(table, Options(posterior=Sampling(chains=2, draws=500, warmup=500)))
-    worths = found.worths()
-    assert set(worths.framing) == {"overall"} and "image" not in found.spread
+    result = sample(table, Options(posterior=Sampling(chains=2, draws=500, warmup=500)))
+    worths = result.worths()
+    assert set(worths.framing) == {"overall"} and "image" not in result.spread
     panel = panels(table)["image0"]
     fit = ordinal_fit(panel, Options())
     mine = worths.set_index("technique")["median"][list(panel.items)].to_numpy()

@@ -37,10 +37,10 @@ def test_what_cannot_be_drawn_is_one_line(run, tmp_path, option, message):
 
 
 def test_sampling_and_priors_are_declared_and_checked():
-    found = declared.options({"posterior": {"prior_worth": 1.5, "chains": 2}})
-    assert found.posterior == Sampling(chains=2, prior_worth=1.5)
-    assert found.posterior.priors["worth"] == 1.5 and found.posterior.priors["clear"] == 2
-    assert found.declared == ("posterior.prior_worth", "posterior.chains")
+    result = declared.options({"posterior": {"prior_worth": 1.5, "chains": 2}})
+    assert result.posterior == Sampling(chains=2, prior_worth=1.5)
+    assert result.posterior.priors["worth"] == 1.5 and result.posterior.priors["clear"] == 2
+    assert result.declared == ("posterior.prior_worth", "posterior.chains")
     for wrong, words in (
         ({"prior_worth": 0}, r"posterior\.prior_worth is 0, expected a number above 0"),
         ({"target_acceptance": 1}, r"posterior\.target_acceptance is 1, expected .* below 1"),
