@@ -13,7 +13,7 @@ _ESCAPES = {
     "%": r"\%",
     "$": r"\$",
     "#": r"\#",
-    "_": r"\_",
+    "_": r"\_\allowbreak{}",
     "{": r"\{",
     "}": r"\}",
     "~": r"\textasciitilde{}",
@@ -27,6 +27,9 @@ _ESCAPES = {
     "\N{PLUS-MINUS SIGN}": r"$\pm$",
 }
 
+#: Tables with more columns are set smaller; in those of so many names longer than this break.
+MOST_COLUMNS, WIDE_COLUMNS, LONGEST = 9, 8, 20
+
 PREAMBLE = (
     r"% Tables with booktabs. Compile this file alone, or \input the part between the lines"
     r""" of '%' of one table.
@@ -36,7 +39,7 @@ PREAMBLE = (
 \usepackage{lmodern}
 \usepackage{textcomp}
 \usepackage[a4paper,landscape,margin=15mm]{geometry}
-\usepackage{booktabs,longtable}
+\usepackage{array,booktabs,longtable}
 \setlength{\tabcolsep}{3.5pt}
 \setlength{\LTcapwidth}{\textwidth}
 \begin{document}
@@ -54,7 +57,10 @@ def table(shown: Shown, simulated: bool = False) -> str:
 
     A cell that repeats the one above it in the first column stays empty.
     """
-    columns = "".join("r" if numeric else "l" for numeric in shown.numeric)
+    columns = "".join(
+        "r" if numeric else _text_column(shown, place)
+        for place, numeric in enumerate(shown.numeric)
+    )
     caption = escape(f"{SIMULATED}. {shown.caption}" if simulated else shown.caption)
     head = " & ".join(escape(name) for name in shown.columns)
     note = escape(shown.note)
@@ -78,7 +84,20 @@ def table(shown: Shown, simulated: bool = False) -> str:
             " & ".join("{}" + cell if cell.startswith("[") else cell for cell in cells) + r" \\"
         )
         above = row[0]
-    return "\n".join([*lines, r"\end{longtable}", ""])
+    lines.append(r"\end{longtable}")
+    if len(shown.columns) > MOST_COLUMNS:  # 7 points, so that it stays on the page
+        lines[1:] = [r"{\scriptsize\setlength{\tabcolsep}{1.8pt}", *lines[1:], "}"]
+    return "\n".join([*lines, ""])
+
+
+def _text_column(shown: Shown, place: int) -> str:
+    """A column of text: as wide as it is, or in a table of many columns so wide, with lines that
+    break.
+    """
+    longest = max((len(row[place]) for row in shown.rows), default=0)
+    if len(shown.columns) < WIDE_COLUMNS or longest <= LONGEST:
+        return "l"
+    return rf">{{\raggedright\arraybackslash}}p{{{LONGEST / 2:g}em}}"
 
 
 def escape_label(name: str) -> str:
