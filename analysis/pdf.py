@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -74,12 +74,18 @@ def make(
             "methods": [{"heading": heading, "text": text} for heading, text in methods],
             "references": list(references),
         }
-        (root / "report.json").write_text(json.dumps(data, ensure_ascii=False), encoding="utf-8")
         (root / "report.typ").write_bytes(TEMPLATE.read_bytes())
         fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-        return typst.compile(
-            str(root / "report.typ"), root=folder, font_paths=[str(fonts)], ignore_system_fonts=True
-        )
+        source = {"root": folder, "font_paths": [str(fonts)], "ignore_system_fonts": True}
+        without = dict.fromkeys(("rows", "tables", "notes", "methods", "references"), ())
+        _write(root, data | without)
+        room = typst.query(str(root / "report.typ"), "<room>", field="value", one=True, **source)
+        _write(root, data | {"room_mm": float(room)})
+        return typst.compile(str(root / "report.typ"), **source)
+
+
+def _write(root: Path, data: Mapping[str, object]) -> None:
+    (root / "report.json").write_text(json.dumps(data, ensure_ascii=False), encoding="utf-8")
 
 
 def rows(pictures: Sequence[Picture]) -> list[list[Picture]]:

@@ -212,12 +212,17 @@ def test_no_page_is_left_half_empty_and_no_caption_without_its_table():
     for lines in (4, 20, 21, 34, 35, 36, 37):
         summary = [("h", ["one line of text"] * lines)]
         made = pdf.make("t", "s", summary, pictures, [table], [], [], [], False)
-        pages = text_of(made, "-layout").split("\f")[:-1]
+        made_text = text_of(made, "-layout")
+        pages = made_text.split("\f")[:-1]
         where = {
             words: next(k for k, page in enumerate(pages) if words in page)
             for words in ("Figures", *(f"picture {k}" for k in "1234"), "Heading", "first")
         }
         assert where["Heading"] == where["first"] and where["Figures"] == where["picture 1"]
+        # the layout has come to rest: figures and pages have numbers of their own
+        assert sorted(re.findall(r"Figure (\d+): picture", made_text)) == list("1234")
+        for number, page in enumerate(pages, start=1):
+            assert re.search(rf"\b{number} ?/ ?{len(pages)}\b", page)
         if lines == 4:  # the first page has room for all three that are low
             assert where["picture 1"] == where["picture 3"] == where["picture 4"] == 0
         assert where["first"] <= 2, (lines, where)
