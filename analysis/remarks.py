@@ -26,6 +26,7 @@ NAMES = {
     "same_answer_share": "of the same answer",
     "median_rt_ms": "of the median time",
     "repeat_share": "of answers when asked again",
+    "trap_share": "of answers to trap pairs",
     "strength_slope": "Strength over the order",
     "side_slope": "Side over the order",
     "time_slope": "Time over the order",
