@@ -22,6 +22,7 @@ from analysis.files import replacing
 from analysis.manifest import KINDS
 from app import recruiting
 from app.models import Participant, Response, Trial
+from app.questionnaire import screen
 from app.study import Study
 from stimuli.asking import Ask
 from stimuli.study import FRAMING
@@ -325,6 +326,29 @@ COLUMNS = (
             "below 1 the window was too small for it; empty without JavaScript"
         ),
         lambda r: r.response.seen_share,
+    ),
+    *(
+        Column(
+            name,
+            kind,
+            unit,
+            f"{words}, of the page that looks at the screen; empty without it",
+            lambda r, name=name: screen.columns(
+                r.participant.screen, r.study.definition.screen.distance_cm
+            )[name],
+        )
+        for name, kind, unit, words in (
+            ("pixels_per_mm", "number", "screen pixels a mm", "By a card held to the screen"),
+            (
+                "pixels_per_degree",
+                "number",
+                "screen pixels a degree",
+                "Of visual angle at the distance that the study asks for",
+            ),
+            ("display_gamma", "number", "", "By a grey matched to fine stripes; sRGB is about 2.2"),
+            ("dark_steps_seen", "number", "0 to 4", "Squares 4, 8, 12, 16 levels above black"),
+            ("bright_steps_seen", "number", "0 to 4", "Squares 4, 8, 12, 16 levels below white"),
+        )
     ),
     Column(
         "reason_ticks",

@@ -111,6 +111,7 @@ class Participant(Base):
     withdrawal_key: Mapped[str | None] = mapped_column(String(16), index=True, unique=True)
     # to go on elsewhere; None: began before there was one
     resume_code: Mapped[str | None] = mapped_column(String(16), index=True, unique=True)
+    screen: Mapped[str | None] = mapped_column(String(500))  # JSON: app.questionnaire.screen
     completed_at: Mapped[datetime | None]
     withdrawn_at: Mapped[datetime | None]
     pilot: Mapped[bool] = mapped_column(default=False)  # tried the study out: does not count

@@ -14,9 +14,13 @@ from stimuli.study import Study as Definition
 SECONDS_A_QUESTION = (20, 30)
 #: What app.models stores of a person, in words; tests hold it to the tables.
 RECORDED = (
-    "your self-rating, your answers, the times at which you began, answered and ended, how often "
-    "a question was opened, the size of your window and of the images on it, and its scaling, how "
-    "you looked at each pair (views, zoom, how long), and how long the page was out of sight"
+    "your self-rating",
+    "your answers",
+    "the times at which you began, answered and ended",
+    "how often a question was opened",
+    "the size of your window and of the images on it, and its scaling",
+    "how you looked at each pair (views, zoom, how long)",
+    "how long the page was out of sight",
 )
 
 
@@ -119,14 +123,16 @@ class Study:
     @property
     def _recorded(self) -> str:
         """What is stored of a participant, with what this study asks beside the pairs."""
-        asked, more = self.definition, ""
+        asked, parts = self.definition, list(RECORDED)
         if own := len(asked.before) + len(asked.after):
-            more += f", your answers to {own} other question{'s' if own > 1 else ''}"
+            parts.append(f"your answers to {own} other question{'s' if own > 1 else ''}")
+        if asked.screen.check:
+            parts.append("the size of your screen's pixels, its greys and the zoom")
         if asked.reason.share:
-            more += ", the reasons that you give for a choice"
+            parts.append("the reasons that you give for a choice")
         if names := ", ".join(asked.recruiting.parameters):
-            more += f", what your recruiter's link says of you ({names})"
-        return RECORDED + more
+            parts.append(f"what your recruiter's link says of you ({names})")
+        return f"{'; '.join(parts[:-1])}; and {parts[-1]}"
 
     def database_url(self, simulated: bool) -> str:
         return (

@@ -245,3 +245,45 @@ def read_pages(table: Table) -> Pages:
         table.take(key, str, default="")
     table.end()
     return pages
+
+
+@dataclass(frozen=True)
+class Screen:
+    """A page that looks at the screen before the questions.
+
+    check       whether there is one
+    least_px    the smallest window, width and height in screen pixels
+    otherwise   of a smaller one: "warn" says so and lets people go on, "refuse" does not
+    card        measure the size of a pixel by a card (ISO/IEC 7810 ID-1)
+    gamma       match a grey to fine stripes, and count the darkest and brightest steps
+    distance_cm at which people are asked to sit; degrees of visual angle follow from it
+    """
+
+    check: bool = False
+    least_px: tuple[int, int] = (0, 0)
+    otherwise: str = "warn"
+    card: bool = True
+    gamma: bool = True
+    distance_cm: int = 60
+
+    def record(self) -> dict:
+        return {**vars(self), "least_px": list(self.least_px)}
+
+
+def read_screen(table: Table) -> Screen:
+    """`[screen]` of a study, checked; the page is there where the table is."""
+
+    def size(value: list) -> bool:
+        return len(value) == 2 and all(type(side) is int and 0 <= side <= 20000 for side in value)
+
+    truth = {"kind": bool, "expected": "true or false"}
+    screen = Screen(
+        table.take("check", default=bool(table.value), **truth),
+        tuple(table.take("least_px", list, "[width, height] in pixels", size, default=[0, 0])),
+        table.one_of("otherwise", ("warn", "refuse"), default="warn"),
+        table.take("card", default=True, **truth),
+        table.take("gamma", default=True, **truth),
+        table.number("distance_cm", 10, 1000, default=60),
+    )
+    table.end()
+    return screen

@@ -22,11 +22,13 @@ from stimuli.asking import (
     Participants,
     Quality,
     Reason,
+    Screen,
     read_asks,
     read_pages,
     read_participants,
     read_quality,
     read_reason,
+    read_screen,
 )
 from stimuli.errors import InputError
 from stimuli.parts import read_toml
@@ -74,6 +76,11 @@ RESERVED = frozenset(
         "rt_flag",
         "kind",
         "expected",
+        "pixels_per_mm",
+        "pixels_per_degree",
+        "display_gamma",
+        "dark_steps_seen",
+        "bright_steps_seen",
         "reason_ticks",
         "reason_text",
     }
@@ -214,6 +221,7 @@ class Study:
     after: tuple[Ask, ...] = ()
     reason: Reason = Reason()
     pages: Pages = Pages()
+    screen: Screen = Screen()
 
     @property
     def framings(self) -> tuple[Level, ...]:
@@ -289,6 +297,7 @@ class Study:
             "after": [ask.record() for ask in self.after],
             "reason": self.reason.record(),
             "pages": vars(self.pages),
+            "screen": self.screen.record(),
             **({"analysis": self.analysis} if self.analysis else {}),
         }
 
@@ -372,6 +381,7 @@ def read_study(
         before=asks[0],
         after=asks[1],
         reason=read_reason(table.table("reason", default={})),
+        screen=read_screen(table.table("screen", default={})),
         pages=read_pages(table.table("pages", default={})),
         recruiting=read_recruiting(table.table("recruiting", default={})),
         participants=read_participants(table.table("participants", default={})),

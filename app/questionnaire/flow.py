@@ -176,6 +176,7 @@ class Standing:
     answered: int
     questions: int
     stated: int
+    screen: str | None
     study_state: str
 
 
@@ -252,6 +253,7 @@ def _answer(
         asked.answered,
         asked.questions,
         asked.stated,
+        asked.screen,
         asked.study_state,
     )
     if asked.order is None or asked.withdrawn_at or asked.study_state == "closed":
@@ -309,6 +311,7 @@ _ASKED = (
     select(
         Participant.id,
         Participant.familiarity,
+        Participant.screen,
         Participant.withdrawn_at,
         Participant.consented_at,
         Participant.answered.expression.label("answered"),

@@ -25,7 +25,7 @@ from sqlalchemy.orm import Session
 
 from app import password, recruiting
 from app.models import Participant
-from app.questionnaire import flow, wording
+from app.questionnaire import flow, screen, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
 from app.recruiting import Door
 from app.security import Limiter
@@ -177,6 +177,36 @@ def before():
 @blueprint.post("/before")
 def state_before():
     return _state("before", study().definition.before)
+
+
+@blueprint.get("/screen")
+def look_at_screen():
+    with database().read() as db:
+        participant = _participant(db)
+        if redirection := _redirect_to_due(participant):
+            return redirection
+        return render_template(
+            "questionnaire/screen.html",
+            small=False,
+            measured=screen.MEASURED,
+            upcoming=_of(flow.upcoming(db, participant, PRELOADED_QUESTIONS)),
+        )
+
+
+@blueprint.post("/screen")
+def keep_screen():
+    wanted, measures = study().definition.screen, screen.read(request.form)
+    small = not screen.large_enough(measures, wanted.least_px)
+    if small and (wanted.otherwise == "refuse" or request.form.get("anyway") != "yes"):
+        return render_template(
+            "questionnaire/screen.html", small=True, measured=screen.MEASURED, upcoming=[]
+        )
+    with database().write() as db:
+        participant = _participant(db, lock=True)
+        if participant and _place(participant) == "questionnaire.look_at_screen":
+            participant.screen = json.dumps(measures)
+        place = _place(participant)
+    return redirect(url_for(place), 303)
 
 
 @blueprint.get("/after")
@@ -391,7 +421,8 @@ def another():
 
 #: Pages of somebody who has begun and has not finished.
 _UNFINISHED = tuple(
-    f"questionnaire.{page}" for page in ("familiarity", "before", "question", "after")
+    f"questionnaire.{page}"
+    for page in ("familiarity", "before", "look_at_screen", "question", "after")
 )
 
 
@@ -413,6 +444,8 @@ def _place(here: Participant | Standing | None) -> str:
         return "questionnaire.familiarity"
     if here.stated < len(asked.before):
         return "questionnaire.before"
+    if asked.screen.check and here.screen is None:
+        return "questionnaire.look_at_screen"
     if unfinished:
         return "questionnaire.question"
     own = len(asked.before) + len(asked.after)

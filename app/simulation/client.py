@@ -26,6 +26,20 @@ WINDOW = {
     "shown_height": 537.47,
     "view": "beside",
 }
+#: Of a 24-inch screen at 1920 x 1080, with the greys of sRGB; `anyway`: whatever is asked for.
+SCREEN = {
+    "window_width": 1920,
+    "window_height": 963,
+    "device_pixel_ratio": 1,
+    "zoom": 1,
+    "screen_width": 1920,
+    "screen_height": 1080,
+    "card_width": 309.5,
+    "grey": 186,
+    "dark_steps": 4,
+    "bright_steps": 4,
+    "anyway": "yes",
+}
 
 
 @dataclass
@@ -138,6 +152,8 @@ class Visitor:
         while True:
             if form := _find(page, "rested"):
                 page = self._get(http, f"question?rested={form.fields['rested']}")
+            elif form := _find(page, "window_width"):
+                page = self._send(http, page, "window_width", **SCREEN)
             elif form := _find(page, "stated"):
                 filled = {
                     name: self._crowd.statement(number, asks[name])

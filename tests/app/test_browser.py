@@ -287,6 +287,7 @@ def test_images_are_there_before_they_are_asked_for(page, address, app):
     page.check("[name=consent]")
     page.click("text=Begin")
     page.get_by_label("Some familiarity").check()
+    page.wait_for_load_state("networkidle")  # a page that is left drops what it waits for
     page.click("text=Continue")
     upcoming = []
     for number in (1, 2, 3):
@@ -528,3 +529,66 @@ def test_the_simulated_study_is_marked(page, study_dir):
         page.goto(address)
         expect(page.locator(".simulated")).to_be_visible()
         assert page.title().startswith("SIMULATED")
+
+
+#: What axe-core looks for: WCAG 2.0 to 2.2, A and AA.
+RULES = {
+    "runOnly": {
+        "type": "tag",
+        "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22a", "wcag22aa"],
+    }
+}
+
+
+def test_axe_finds_nothing_on_the_pages_of_a_participant(tmp_path, write_study, page):
+    """Each kind of page once, the question in each view, on a desktop and on a phone."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    study = {
+        "before": [{"name": "age", "kind": "choice", "text": "Age?", "options": ["18", "19"]}],
+        "after": [{"name": "words", "kind": "text", "text": "Remarks?", "required": False}],
+        "reason": {"share": 1, "ticks": ["skin"]},
+        "screen": {"least_px": [1200, 600]},
+        "pages": {"instructions": "Look.", "debrief": "Skin.", "break_every": 1},
+    }
+    seen = []
+
+    def check():
+        found = Axe().run(page, options=RULES).response
+        seen.append(page.locator("h1").text_content())
+        assert [(one["id"], one["nodes"][0]["html"]) for one in found["violations"]] == [], seen
+
+    with running(create_app(write_study(tmp_path / "asking", **study))) as address:
+        page.goto(address)
+        check()
+        page.check("[name=consent]")
+        page.click("text=Begin")
+        check()
+        page.get_by_label("Some familiarity").check()
+        page.click("text=Continue")
+        check()
+        page.get_by_label("19").check()
+        page.click("text=Continue")
+        check()
+        page.select_option("[name=dark_steps]", "4")
+        page.select_option("[name=bright_steps]", "3")
+        page.click("text=Continue")
+        check()
+        page.click("button:text('Begin')")
+        shown(page, 1)
+        for view in ("beside", "flicker", "wipe"):
+            page.click(f"[data-mode={view}]")
+            check()
+        page.click(".help summary")
+        page.click(".reason summary")
+        check()
+        page.set_viewport_size({"width": 390, "height": 844})
+        check()
+        page.keyboard.press("1")
+        page.click("button:text('Confirm')")
+        page.wait_for_selector("text=Time for a rest")
+        check()
+        for path in ("withdraw", "resume/"):
+            page.goto(f"{address}{path}")
+            check()
+    assert len(set(seen)) == 9

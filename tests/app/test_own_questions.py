@@ -36,7 +36,7 @@ def study_dir(tmp_path, write_study):
 def test_the_whole_of_it_in_its_order(app, person):
     somebody = person()
     text = somebody.get("/").text
-    assert "your answers to 3 other questions, the reasons that you give" in text
+    assert "your answers to 3 other questions; and the reasons that you give" in text
     somebody.send("consent", consent="yes")
     somebody.send("familiarity", familiarity=3)
     assert somebody.path == "/before"
@@ -73,6 +73,44 @@ def test_the_whole_of_it_in_its_order(app, person):
         assert (row["answer"], row["reason_ticks"], row["reason_text"]) == (1, "2", "<b>ears</b>")
     book = export.codebook_md(app.extensions["study"], simulated=False)
     assert "| `age` | integer | 1: under 30, 2: 30 on |" in book and "- reason 2: ears glow" in book
+
+
+def test_the_screen_is_looked_at(tmp_path, write_study):
+    wanted = {"least_px": [1600, 700], "otherwise": "warn", "distance_cm": 60}
+    app = create_app(write_study(tmp_path / "screen", screen=wanted))
+    somebody = Person(app)
+    assert "the zoom" in somebody.get("/").text
+    somebody.send("consent", consent="yes")
+    somebody.send("familiarity", familiarity=3)
+    assert somebody.path == "/screen"
+    window = {"window_width": 640, "window_height": 400, "device_pixel_ratio": 2, "zoom": 1}
+    seen = {"card_width": 342.4, "grey": 186, "dark_steps": 3, "bright_steps": "nonsense"}
+    somebody.send("window_width", **window, **seen)
+    assert "smaller than the study needs: 1600 x 700" in somebody.page.text
+    somebody.send("window_width", **window, **seen, anyway="yes")
+    assert somebody.path == "/question"
+    somebody.answer(1)
+    with app.extensions["database"].read() as db:
+        (row,) = export.records(db, app.extensions["study"], simulated=False)
+    assert row["pixels_per_mm"] == 8.0  # 342.4 CSS pixels are 684.8, over 85.6 mm
+    assert row["pixels_per_degree"] == pytest.approx(8 * 600 * 0.0174533, rel=1e-3)
+    assert row["display_gamma"] == pytest.approx(2.2, abs=0.01)
+    assert (row["dark_steps_seen"], row["bright_steps_seen"]) == (3, None)
+
+
+def test_a_screen_that_is_too_small_can_be_refused(tmp_path, write_study):
+    wanted = {"least_px": [1600, 700], "otherwise": "refuse", "card": False, "gamma": False}
+    somebody = Person(create_app(write_study(tmp_path / "screen", screen=wanted)))
+    somebody.get("/")
+    somebody.send("consent", consent="yes")
+    somebody.send("familiarity", familiarity=3)
+    small = {"window_width": 800, "window_height": 700, "device_pixel_ratio": 1, "anyway": "yes"}
+    somebody.send("window_width", **small)
+    assert "smaller than the study needs" in somebody.page.text
+    somebody.get("/question")
+    assert somebody.path == "/screen"
+    somebody.send("window_width", **small | {"device_pixel_ratio": 2})
+    assert somebody.path == "/question"
 
 
 def test_an_answer_that_the_scale_lacks_is_not_taken(app):
@@ -114,6 +152,7 @@ def test_reasons_are_asked_of_a_share_that_the_seed_draws(tmp_path, write_study)
         ({"before": [{"name": "a", "kind": "choice", "text": "?"}]}, r"before\[0\].options"),
         ({"after": [{"name": "a", "kind": "choise", "text": "?"}]}, "one of choice, scale, text"),
         ({"reason": {"share": 2}}, "a number from 0 to 1"),
+        ({"screen": {"least_px": [1]}}, "screen.least_px"),
         ({"pages": {"break_every": -1}}, "pages.break_every"),
         ({"scale": [{"value": -1, "label": "a"}, {"value": 2, "label": "b"}]}, "both sides"),
     ],
@@ -121,3 +160,35 @@ def test_reasons_are_asked_of_a_share_that_the_seed_draws(tmp_path, write_study)
 def test_what_cannot_be_asked_is_refused(tmp_path, write_study, changes, error):
     with pytest.raises(InputError, match=error):
         create_app(write_study(tmp_path / "study", **changes))
+
+
+#: Every column about a participant: by which words of the consent, or why no words are needed.
+STORED = {
+    "your self-rating": "familiarity",
+    "your answers": "answer reason_ticks reason_text image_left_sha256 image_right_sha256",
+    "the times at which you began, answered and ended": "consented_at answered_at started_at "
+    "completed_at withdrawn_at rt_ms timed_by rt_server_ms rt_reported_ms at",
+    "how often a question was opened": "times_shown",
+    "the size of your window and of the images on it, and its scaling": "viewport_width "
+    "viewport_height device_pixel_ratio shown_width shown_height pixel_scale seen_share",
+    "how you looked at each pair (views, zoom, how long)": "view beside_ms flicker_ms wipe_ms "
+    "flips pixel_scale_largest",
+    "how long the page was out of sight": "away_ms",
+}
+#: Numbers and codes that the server makes, what a researcher notes, what a recruiter's link says.
+OURS = (
+    "id participant_id trial_id visit completion_code withdrawal_key resume_code pilot recruit "
+    "recruit_id "
+    "screen excluded_at excluded_because"
+)
+OWN = "name value"  # of the study's own questions
+
+
+def test_the_consent_says_all_that_is_stored():
+    from app.models import Participant, Response, Statement
+    from app.study import RECORDED
+
+    assert tuple(STORED) == RECORDED
+    known = set(" ".join([*STORED.values(), OURS, OWN]).split())
+    columns = {c.name for table in (Participant, Response, Statement) for c in table.__table__.c}
+    assert columns <= known, columns - known
