@@ -33,8 +33,8 @@ CLAIM = timedelta(minutes=1)
 #: By the server's clock, all answers together came faster than the rule for their median allows;
 #: and a browser said that an answer took longer than its question had been there.
 TOO_FAST, TIMES_DOUBTFUL = "too_fast", "times_doubtful"
-#: Participants on the page that updates itself; all are in participants.csv.
-LATEST = 50
+#: Participants on the page that updates itself; all are on a page of their own.
+LATEST = 10
 #: Without an answer for this long, an unfinished participant counts as dropped out (and may still
 #: come back).
 IDLE = timedelta(minutes=30)

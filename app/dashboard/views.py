@@ -132,6 +132,14 @@ def participants_csv():
     return _download(body, "participants.csv")
 
 
+@blueprint.get("/participants")
+def everybody():
+    """All of them, on a page that does not update itself."""
+    with database().read() as db:
+        people = live.participants(db, study(), live.responses(db, study()))
+    return render_template("dashboard/everybody.html", participants=people)
+
+
 @blueprint.get("/participants/<code>")
 def participant(code: str):
     """One person: what they are flagged for, and leaving them out or letting them count again."""

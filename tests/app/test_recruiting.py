@@ -192,6 +192,10 @@ def test_excluding_and_restoring_has_a_reason_and_deletes_nothing(app, person, e
         ("restore", "P0001: it was a mistake"),
         ("exclude", "P0001: said that <b>they guessed</b>"),
     ]
+    for _ in range(12):
+        person().begin()
+    assert "All 14 participants" in experimenter.get("/dashboard/").text
+    assert experimenter.get("/dashboard/participants").text.count("/participants/P") == 14
     for nobody in ("P0099", "P1", "x", "P00001", "P" + "9" * 18):
         assert experimenter.get(f"/dashboard/participants/{nobody}").status_code == 404
 

@@ -39,6 +39,7 @@ CLOSED = [
         "live.json",
         "responses.csv",
         "participants.csv",
+        "participants",
         "participants/P0001",
         "pilot_responses.csv",
         "recruits.csv",
