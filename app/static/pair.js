@@ -52,11 +52,13 @@ export class Viewer {
     const wanted = this.geometry();
     const token = (this.token = Symbol());
     const soon = setTimeout(() => this.pair.classList.add("loading"), this.bitmaps ? SOON_MS : 0);
-    const bitmaps = await Promise.all(this.sides.map((side) => pictures.bitmap(side, wanted.picture)));
+    const same = this.now?.picture === wanted.picture;
+    const bitmaps = same ? this.bitmaps : await Promise.all(this.sides.map((side) => pictures.bitmap(side, wanted.picture)));
     clearTimeout(soon);
     if (token !== this.token || !this.pair.isConnected) return;
     this.pair.classList.remove("loading");
     this.tick();
+    if (!same) this.bitmaps?.forEach((bitmap) => bitmap.close());
     this.bitmaps = bitmaps;
     this.now = { ...wanted, mode: this.mode };
     this.largest = Math.max(this.largest ?? 0, wanted.scale);
