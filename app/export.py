@@ -7,13 +7,15 @@ One list describes the columns: the header, the rows and the codebook all come f
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
+import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sqlalchemy import ColumnElement, Select, func, select
 from sqlalchemy.orm import Session, selectinload
@@ -25,6 +27,7 @@ from app.models import Participant, Response, Trial
 from app.questionnaire import screen
 from app.study import Study
 from stimuli.asking import Ask
+from stimuli.manifest import NAME as MANIFEST
 from stimuli.study import FRAMING
 
 CHUNK_ROWS = 500
@@ -501,6 +504,41 @@ def responses_csv(session: Session, study: Study, *, simulated: bool) -> Iterato
     return _csv(names, (row.values() for row in records(session, study, simulated=simulated)))
 
 
+def responses_jsonl(session: Session, study: Study, *, simulated: bool) -> Iterator[str]:
+    """responses.jsonl: the same rows, an object a line, texts as they were written."""
+    lines: list[str] = []
+    for row in records(session, study, simulated=simulated):
+        lines.append(json.dumps(row, ensure_ascii=False) + "\n")
+        if len(lines) == CHUNK_ROWS:
+            yield "".join(lines)
+            lines = []
+    yield "".join(lines)
+
+
+def write_zip(file: BinaryIO, session: Session, study: Study, *, simulated: bool) -> None:
+    """All tables of one snapshot as a zip, with SHA256SUMS and the number of answers in
+    counts.json.
+    """
+    parts = {
+        "responses.csv": responses_csv(session, study, simulated=simulated),
+        "responses.jsonl": responses_jsonl(session, study, simulated=simulated),
+        "codebook.csv": codebook_csv(study),
+        "codebook.md": [codebook_md(study, simulated=simulated)],
+        "manifest.json": [(study.directory / MANIFEST).read_text("utf-8")],
+        "counts.json": [json.dumps({"responses": count(session), "simulated": simulated}) + "\n"],
+    }
+    sums = []
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, texts in parts.items():
+            digest = hashlib.sha256()
+            with archive.open(name, "w", force_zip64=True) as entry:
+                for text in texts:
+                    entry.write(text.encode())
+                    digest.update(text.encode())
+            sums.append(f"{digest.hexdigest()}  {name}\n")
+        archive.writestr("SHA256SUMS", "".join(sums))
+
+
 def pilot_csv(session: Session, study: Study, *, simulated: bool) -> Iterator[str]:
     """The same of those who tried the study out and did not withdraw."""
     who = Participant.pilot.is_(True) & Participant.withdrawn_at.is_(None)
@@ -556,15 +594,7 @@ def recruits_csv(session: Session, study: Study) -> Iterator[str]:
         for one in found
     )
     header = (*names, "completion_code", "completed", "withdrawn", "excluded")
-    return _csv(header, (map(_harmless, row) for row in rows))
-
-
-def _harmless(value: Any) -> Any:
-    """What a stranger wrote, so that no spreadsheet takes it for a formula."""
-    return f"'{value}" if isinstance(value, str) and value[:1] in _FORMULA else value
-
-
-_FORMULA = frozenset("=+-@\t\r")
+    return _csv(header, rows)
 
 
 def codebook_csv(study: Study) -> Iterator[str]:
@@ -629,12 +659,22 @@ def _write(path: Path, parts: Iterable[str]) -> None:
         file.writelines(parts)
 
 
+def _harmless(value: Any) -> Any:
+    """A text that no spreadsheet takes for a formula, whoever wrote it; responses.jsonl has it as
+    it was written.
+    """
+    return f"'{value}" if isinstance(value, str) and value[:1] in _FORMULA else value
+
+
+_FORMULA = frozenset("=+-@\t\r")
+
+
 def _csv(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> Iterator[str]:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(header)
     for number, row in enumerate(rows, start=1):
-        writer.writerow(row)
+        writer.writerow(map(_harmless, row))
         if number % CHUNK_ROWS == 0:
             yield buffer.getvalue()
             buffer.seek(0)

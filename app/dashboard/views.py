@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import ExitStack
+from tempfile import TemporaryFile
 
 from flask import (
     Blueprint,
@@ -15,6 +16,7 @@ from flask import (
     redirect,
     render_template,
     request,
+    send_file,
     send_from_directory,
     url_for,
 )
@@ -121,6 +123,33 @@ def completions_csv():
     with database().read() as db:
         body = "".join(export.completions_csv(db))
     return _download(body, "completions.csv")
+
+
+@blueprint.get("/responses.jsonl")
+def responses_jsonl():
+    """The same table, an object a line."""
+    with ExitStack() as opened:
+        db = opened.enter_context(database().read())
+        body = export.responses_jsonl(db, study(), simulated=simulated())
+        response = _download(
+            body, "simulated_responses.jsonl" if simulated() else "responses.jsonl"
+        )
+        response.mimetype = "application/jsonl"
+        response.headers["X-Row-Count"] = str(export.count(db))
+        response.call_on_close(opened.pop_all().close)
+    return response
+
+
+@blueprint.get("/export.zip")
+def export_zip():
+    """Tables, codebook and manifest of one moment, with hashes and the number of answers."""
+    file = TemporaryFile()  # noqa: SIM115 -- closed when it was sent
+    with database().read() as db:
+        export.write_zip(file, db, study(), simulated=simulated())
+    file.seek(0)
+    response = send_file(file, "application/zip", as_attachment=True, download_name="export.zip")
+    response.headers["Cache-Control"] = "no-store"
+    return response
 
 
 @blueprint.get("/participants.csv")

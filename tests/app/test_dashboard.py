@@ -1,8 +1,11 @@
 """What the experimenter sees and downloads."""
 
 import csv
+import hashlib
 import io
+import json
 import re
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
@@ -61,6 +64,26 @@ def test_the_export_is_what_the_analysis_reads(person, experimenter, tmp_path):
     (tmp_path / "responses.csv").write_bytes(experimenter.get("/dashboard/responses.csv").data)
     responses = read_responses(tmp_path / "responses.csv")
     assert len(responses.frame) == 30 and not responses.findings and not responses.simulated
+
+
+def test_tables_as_lines_and_in_one_file_with_hashes(person, experimenter, study_dir):
+    person().begin().answer(*[1, -2, 0] * 10)
+    rows = table(experimenter.get("/dashboard/responses.csv"))
+    response = experimenter.get("/dashboard/responses.jsonl")
+    lines = [json.loads(line) for line in response.text.splitlines()]
+    assert len(lines) == 30 == int(response.headers["X-Row-Count"])
+    as_text = [{k: "" if v is None else str(v) for k, v in line.items()} for line in lines]
+    assert as_text == rows
+    with zipfile.ZipFile(io.BytesIO(experimenter.get("/dashboard/export.zip").data)) as archive:
+        sums = dict(
+            reversed(line.split("  ")) for line in archive.read("SHA256SUMS").decode().splitlines()
+        )
+        assert sums.keys() == set(archive.namelist()) - {"SHA256SUMS"}
+        for name, digest in sums.items():
+            assert hashlib.sha256(archive.read(name)).hexdigest() == digest
+        assert archive.read("responses.jsonl") == response.data
+        assert archive.read("manifest.json") == (study_dir / "manifest.json").read_bytes()
+        assert json.loads(archive.read("counts.json")) == {"responses": 30, "simulated": False}
 
 
 def test_withdrawn_answers_are_not_exported_nor_counted(person, experimenter):

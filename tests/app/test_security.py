@@ -39,6 +39,8 @@ CLOSED = [
         "live.json",
         "responses.csv",
         "participants.csv",
+        "responses.jsonl",
+        "export.zip",
         "participants",
         "participants/P0001",
         "pilot_responses.csv",
