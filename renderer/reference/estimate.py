@@ -139,7 +139,7 @@ def estimate(
     done = _take_up(file, sums, half)
     # so many walks of a point at a time that small pictures fill a block too
     together = max(1, min(half, BLOCK // max(2 * len(points), 1)))
-    saved = time.monotonic()
+    started = saved = time.monotonic()
     bar = tqdm(
         total=half * 2, initial=done * 2, desc="reference", unit="walk", disable=None, leave=False
     )
@@ -156,7 +156,7 @@ def estimate(
                 saved = time.monotonic()
     finally:
         bar.close()
-        if time.monotonic() - saved > SAVE_EVERY_S / 4 or (file is not None and file.is_file()):
+        if time.monotonic() - started > SAVE_EVERY_S:
             _save(file, sums, done)
     return Halves(*sums / (half * medium.albedo), half)
 
