@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -63,8 +64,8 @@ def command(
     """Draw the posterior of a multilevel model of RESPONSES, a responses.csv.
 
     People and images are both samples, so that it also says what would hold for another image of
-    the same sort. Needs the extra `subdermal[bayes]`. Nothing is written before the last draw:
-    sampling that is interrupted begins anew.
+    the same sort. Needs the extra `subdermal[bayes]`. Ctrl+C ends it at once; nothing is written
+    before the last draw, and sampling that was interrupted begins anew.
     """
     from analysis import declared as declarations
     from analysis.options import Sampling
@@ -81,7 +82,12 @@ def command(
     given = {name: value for name, value in sampling.items() if value is not None}
     given |= {f"prior_{name}": value for name, value in priors.items()}
     options = replace(options, posterior=replace(options.posterior, **given))
-    found = sample(answers, options, progress=sys.stderr.isatty())
+    # all draws are one compiled call, in which Python sees no interrupt: the system's end holds
+    handler = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        found = sample(answers, options, progress=sys.stderr.isatty())
+    finally:
+        signal.signal(signal.SIGINT, handler)
     files, sentences = posterior_files(
         found, answers, written(), declarations.fingerprint(declared)
     )

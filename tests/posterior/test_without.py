@@ -1,5 +1,6 @@
 """What `subdermal posterior` says where its sampler is not installed, or its input is wrong."""
 
+import signal
 from importlib import util
 
 import pytest
@@ -34,6 +35,21 @@ def test_what_cannot_be_drawn_is_one_line(run, tmp_path, option, message):
     path = tmp_path / "responses.csv"
     code, _, err = run("posterior", path, "--out", tmp_path / "out", *option)
     assert code == 2 and message in err and err.count("\n") == 1
+
+
+def test_an_interrupt_ends_sampling_at_once(run, tmp_path, monkeypatch):
+    """The compiled loop never looks for Python's handler, so the system's holds meanwhile."""
+    before, during = signal.getsignal(signal.SIGINT), []
+
+    def sample(*_, **__):
+        during.append(signal.getsignal(signal.SIGINT))
+        raise InputError("nothing is drawn here")
+
+    monkeypatch.setattr("analysis.posterior.sample", sample)
+    (tmp_path / "responses.csv").write_text(ROWS)
+    code, _, err = run("posterior", tmp_path / "responses.csv", "--out", tmp_path / "out")
+    assert code == 2 and "nothing is drawn here" in err
+    assert during == [signal.SIG_DFL] and signal.getsignal(signal.SIGINT) is before
 
 
 def test_sampling_and_priors_are_declared_and_checked():
