@@ -16,14 +16,16 @@ export function scales(viewer, fitted) {
 }
 
 // The frames of a mode: their size, where they begin in the room, and how wide the picture in them is.
+// base: the scale that decides between side by side and one above the other, so that zooming does not move the images.
 // room: across, down, caption, gap, below (taken by the divider's handle), device pixels; box: width, height, image pixels.
-export function place(mode, scale, room, box) {
+export function place(mode, scale, room, box, base = scale) {
   const down = room.down - room.caption;
   if (mode !== "beside") return alone(scale, room, box, down - (mode === "wipe" ? room.below : 0));
-  const beside = frame(scale, box, Math.floor((room.across - room.gap) / 2), down);
-  const above = frame(scale, box, room.across, Math.floor(room.down / 2) - room.caption);
-  const chosen = beside.width * beside.height >= above.width * above.height ? beside : above;
-  const { width, height } = chosen, step = chosen === beside ? { x: width + room.gap, y: 0 } : { x: 0, y: height + room.caption };
+  const beside = (at) => frame(at, box, Math.floor((room.across - room.gap) / 2), down);
+  const above = (at) => frame(at, box, room.across, Math.floor(room.down / 2) - room.caption);
+  const area = ({ width, height }) => width * height, sideways = area(beside(base)) >= area(above(base));
+  const chosen = (sideways ? beside : above)(scale);
+  const { width, height } = chosen, step = sideways ? { x: width + room.gap, y: 0 } : { x: 0, y: height + room.caption };
   const x = Math.floor((room.across - width - step.x) / 2), y = Math.max(0, Math.floor((down - height - step.y) / 2));
   return { ...chosen, origins: [{ x, y }, { x: x + step.x, y: y + step.y }] };
 }

@@ -71,7 +71,7 @@ export class Viewer {
     const fitted = this.options.display === FIT ? place(this.mode, FIT, room, box).scale : 1;
     this.scales = scales(this.options, fitted);
     this.step = Math.min(this.step, this.scales.length - 1);
-    const found = place(this.mode, this.scales[this.step], room, box);
+    const found = place(this.mode, this.scales[this.step], room, box, this.scales[0]);
     return { ...found, fits: this.scales[this.step] === FIT, room };
   }
 

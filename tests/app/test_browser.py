@@ -501,6 +501,49 @@ def test_both_images_zoom_and_move_together(noise_study, chromium):
         assert on_screen(page, 1)[0].shape == before[0].shape
 
 
+def test_fingers_swap_zoom_and_move(noise_study, chromium):
+    screen = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+    with (
+        running(create_app(noise_study("exact"))) as address,
+        chromium.new_context(**screen) as context,
+    ):
+        page = context.new_page()
+        touch = context.new_cdp_session(page)
+
+        def fingers(kind, *places):
+            points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(places)]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        page.goto(address)
+        page.check("[name=consent]")
+        page.click("text=Begin")
+        expect(page.locator(".coarse")).to_be_visible()
+        expect(page.locator(".fine")).to_be_hidden()
+        page.get_by_label("Some familiarity").check()
+        page.click("text=Continue")
+        shown(page, 1)
+        box = page.locator(".pair canvas").first.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        fingers("touchStart", (x - 20, y), (x + 20, y))
+        fingers("touchMove", (x - 28, y), (x + 28, y))
+        fingers("touchEnd")
+        expect(page.locator(".badge")).to_have_text("2:1")
+        page.wait_for_timeout(300)  # what follows at once belongs to the same gesture
+        before = on_screen(page, 1)[0]
+        fingers("touchStart", (x, y))
+        fingers("touchMove", (x - 30, y))
+        fingers("touchEnd")
+        page.wait_for_timeout(300)
+        np.testing.assert_array_equal(on_screen(page, 1)[0][:, :-30], before[:, 30:])
+        page.click("[data-mode=flicker]")
+        expect(page.locator("[data-mode=flicker]")).to_have_attribute("aria-pressed", "true")
+        label = page.locator("figcaption").first
+        fingers("touchStart", (x, y))
+        expect(label).to_have_text("B")
+        fingers("touchEnd")
+        expect(label).to_have_text("A")
+
+
 def picture(png):
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
 
