@@ -13,6 +13,12 @@ from tests.renderer.slab import frame_of_ball
 FRAME_BYTES, PIECE_BYTES = 48, 72
 
 
+@pytest.fixture(scope="module")
+def small_ball():
+    with frame_of_ball((32, 32)) as frame:
+        yield frame
+
+
 @pytest.mark.parametrize("supersample", [1, 2, 3, 4])
 @pytest.mark.parametrize("reach", [0.0, 7.3, 60.0, 500.0])
 def test_pieces_cover_every_row_once_with_all_that_their_light_comes_from(supersample, reach):
@@ -74,13 +80,11 @@ def test_a_frame_and_its_pieces_hold_what_is_reckoned_and_free_it(frames, drawin
     assert context.held == before
 
 
-def test_techniques_over_surfaces_keep_nothing(techniques):
-    with frame_of_ball((96, 96)) as frame:
-        context = frame.renderer.context
-        for name, technique in techniques.items():
-            frame.scatter(technique).delete()  # a diffuse model of its own is kept by the frame
-            context.make_current()
-            before = context.held
-            frame.scatter(technique).delete()
-            context.make_current()
-            assert context.held == before, name
+@pytest.mark.parametrize("name", ["gosselin", "deon_luebke", "splat_dipole"])
+def test_techniques_over_surfaces_keep_nothing(name, techniques, small_ball):
+    context, held = small_ball.renderer.context, []
+    for _ in range(2):  # the first time makes what a surface is looked up by
+        small_ball.scatter(techniques[name]).delete()
+        context.make_current()
+        held.append(context.held)
+    assert held[0] == held[1]
