@@ -9,6 +9,7 @@ out.
 
 from __future__ import annotations
 
+import argparse
 import resource
 import time
 
@@ -21,34 +22,40 @@ ROUNDS = 5
 #: Of what works on the surface and takes seconds: rounds, and points farther apart than by default.
 SURFACE_ROUNDS = 1
 SPACING_MM = 2.0
+SURFACE = ("atlas", "points")  # walks are the truth, and as slow as it is
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--framing", action="append", choices=list(renderer.FRAMINGS))
+    parser.add_argument("--rounds", type=int, default=ROUNDS, help="of filters of the screen")
+    given = parser.parse_args()
     sparse = {"points": {"spacing_mm": SPACING_MM}}
     kinds = {n: kind for n, kind in renderer.TECHNIQUES.items() if kind.domain != "walks"}
     techniques = {name: renderer.make(name, sparse.get(kinds[name].domain)) for name in kinds}
     screen = {name: made for name, made in techniques.items() if made.domain == "screen"}
-    surface = {name: made for name, made in techniques.items() if name not in screen}
+    surface = {name: made for name, made in techniques.items() if made.domain in SURFACE}
     start = time.perf_counter(), time.process_time()
     staged = scenes.stage(scenes.read_scene(scenes.load_table("thesis")))
     loaded = time.perf_counter() - start[0], time.process_time() - start[1]
     with renderer.Renderer(staged.graph) as drawing:
         print(
-            f"{drawing.info()['gl_renderer']}, 1920x1080, 2x2 supersampling, {ROUNDS} rounds "
-            "in turn, medians"
+            f"{drawing.info()['gl_renderer']}, 1920x1080, 2x2 supersampling, {given.rounds} "
+            "rounds in turn, medians"
         )
         print(f"head: {loaded[0]:.1f} s wall, {loaded[1]:.1f} s CPU")
-        for framing, camera in renderer.FRAMINGS.items():
+        for framing in given.framing or renderer.FRAMINGS:
+            camera = renderer.FRAMINGS[framing]
             start = time.perf_counter(), time.process_time()
             frame = drawing.frame(camera)
             shared = time.perf_counter() - start[0], time.process_time() - start[1]
-            samples = {}
-            for name, technique in techniques.items():
+            samples = dict.fromkeys(surface, np.nan)
+            for name, technique in screen.items():
                 counts = frame.render(technique).samples
                 samples[name] = counts[counts > 0].mean()
             median = {
                 name: np.median(spent, axis=0)
-                for timed, rounds in ((screen, ROUNDS), (surface, SURFACE_ROUNDS))
+                for timed, rounds in ((screen, given.rounds), (surface, SURFACE_ROUNDS))
                 for name, spent in frame.time(timed, rounds).items()
             }
             frame.close()
