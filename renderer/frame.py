@@ -14,6 +14,7 @@ from renderer import VERSION, gl
 from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.memory import give_back, give_back_large
+from renderer.optics.transmittance import Translucency
 from renderer.passes.composite import composite
 from renderer.passes.environment import Surroundings
 from renderer.passes.given import draw_given
@@ -176,14 +177,16 @@ class Renderer:
         point_mm: float = 1.0,
         diffuse: str = "lambert",
         only_irradiance: bool = False,
+        translucency: Translucency | None = None,
     ) -> gl.Target:
         """A surface's light over its texture atlas ("ATLAS") or over points on it ("POINTS").
 
         size: (width, height) in texels; points: from `surfaces.points`, whose size it is; point_mm:
         what a point stands for, finer relief fades; diffuse: how light passes the face;
         only_irradiance: specular and transmitted light are left out, which takes two thirds of
-        the time. The target has PLACED_FORMATS; the caller frees it. Specular light, and Disney's
-        diffuse, are those towards the subject's front.
+        the time; translucency: how what comes through is reckoned, None for nothing. The target has
+        PLACED_FORMATS; the caller frees it. Specular light, and Disney's diffuse, are those towards
+        the subject's front.
         """
         self.context.make_current()
         target = gl.Target(*size, list(PLACED_FORMATS), depth=domain == "ATLAS")
@@ -195,7 +198,7 @@ class Renderer:
             "point_mm": point_mm,
         }
         light = (self.lamps, self.surroundings)
-        rest = (domain, drawn, points, diffuse, only_irradiance)
+        rest = (domain, drawn, points, diffuse, only_irradiance, translucency)
         self.surfaces.draw(self.program, *light, shared, *rest)
         return target
 
@@ -204,8 +207,8 @@ class Frame:
     """The shared buffers of one view; use it as a context manager, or close() it.
 
     surface.textures: irradiance (alpha: the medium's id), specular light under hair (alpha: what
-    hair hides), albedo (alpha: what gets out through the face), view depth, transmitted light; all
-    at the image's size times supersample.
+    hair hides), albedo (alpha: what gets out through the face), view depth; all at the image's size
+    times supersample.
     """
 
     def __init__(self, renderer: Renderer, view: View, picture: Picture):
@@ -214,6 +217,7 @@ class Frame:
         self.width, self.height = renderer.size[0] * s, renderer.size[1] * s
         self.whole = Piece(0, self.height, 0, self.height)
         self._shaded: dict[str, gl.Target] = {}
+        self._transmitted: dict[Translucency, gl.Target] = {}
         self._shared = {
             "camera_position": view.eye,
             "view": view.view,
@@ -263,9 +267,24 @@ class Frame:
             self._shaded[diffuse] = target
         return self._shaded[diffuse].textures[0]
 
+    def transmitted(self, translucency: Translucency) -> gl.Texture:
+        """Light that comes through thin parts, to be added to the irradiance; the last is kept."""
+        if translucency not in self._transmitted:
+            for target in self._transmitted.values():
+                target.delete()
+            self._transmitted.clear()
+            target = gl.Target(self.width, self.height, [GL.GL_RGBA16F], depth=self.surface)
+            target.bind(clear=(0.0, 0.0, 0.0, 0.0))
+            target.bind(depth_test=True)  # the depth is there already
+            r = self.renderer
+            shared = (r.program, r.lamps, r.surroundings, self._shared)
+            r.surfaces.draw_transmitted(*shared, translucency)
+            self._transmitted[translucency] = target
+        return self._transmitted[translucency].textures[0]
+
     def irradiance(
         self,
-        translucent: bool,
+        translucency: Translucency | None = None,
         medium: int = 1,
         texturing: float = 0.0,
         diffuse: str = "lambert",
@@ -273,17 +292,18 @@ class Frame:
     ) -> gl.Texture:
         """The input of the techniques: irradiance, alpha 1 where this medium scatters.
 
-        translucent: with the transmitted light of Jimenez 2010 added; texturing: times the albedo
-        to this power, which the composite then leaves out; diffuse: how light passes the face.
+        translucency: with the light that comes through added, None: without; texturing: times the
+        albedo to this power, which the composite then leaves out; diffuse: how light passes the
+        face.
         """
         r, piece = self.renderer, piece or self.whole
         below = self._irradiance(diffuse)
-        own = len(r.media) <= 1 and not translucent and not texturing
+        own = len(r.media) <= 1 and not translucency and not texturing
         if own and piece == self.whole:
             return below
+        through = self.transmitted(translucency) if translucency else None
+        light = (below, through, self.surface.textures[2], medium, texturing)
         given = gl.Target(self.width, piece.rows, [GL.GL_RGBA32F])
-        _, _, albedo, _, transmitted = self.surface.textures
-        light = (below, transmitted, albedo, medium, translucent, texturing)
         draw_given(r.context, r.program, given, *light, piece.first)
         return given.textures[0]
 
@@ -306,7 +326,7 @@ class Frame:
 
     def inputs(
         self,
-        translucent: bool,
+        translucency: Translucency | None = None,
         irradiance: gl.Texture | None = None,
         depths: gl.Texture | None = None,
         medium: int = 1,
@@ -319,7 +339,7 @@ class Frame:
         return Inputs(
             r.context,
             r.program,
-            irradiance or self.irradiance(translucent, medium, texturing, diffuse, piece),
+            irradiance or self.irradiance(translucency, medium, texturing, diffuse, piece),
             depths or self._depths(piece),
             self.width,
             piece.rows,
@@ -329,7 +349,7 @@ class Frame:
             Room(
                 tuple(drawn for drawn in r.surfaces.surfaces if drawn.id == medium),
                 medium,
-                partial(r.placed, diffuse=diffuse),
+                partial(r.placed, diffuse=diffuse, translucency=translucency),
                 r.surfaces.points,
                 self._shared,
                 self.surface,
@@ -449,11 +469,14 @@ class Frame:
     def close(self) -> None:
         """Free the shared buffers."""
         self.renderer.context.make_current()
-        for target in (*self._shaded.values(), self.surface):
+        own = (*self._shaded.values(), *self._transmitted.values(), self.surface)
+        for target in own:
             target.delete()
         self._shaded.clear()
+        self._transmitted.clear()
 
 
 def _light(technique: Technique) -> dict:
     """Which light a technique asks for."""
-    return {name: getattr(technique, name) for name in ("translucent", "texturing", "diffuse")}
+    own = {name: getattr(technique, name) for name in ("texturing", "diffuse")}
+    return {"translucency": technique.transmission, **own}

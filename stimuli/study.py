@@ -362,6 +362,7 @@ def read_study(
         entries = table.tables(key, least=0) if key in table.value else []
         taken = [*RESERVED, *(factor.name for factor in factors), *(a.name for a in sum(asks, ()))]
         asks.append(read_asks(entries, taken))
+    shared = table.take("parameters", dict, default={}) if render is not None else {}
     study = Study(
         name=table.name("name"),
         title=table.text("title"),
@@ -369,7 +370,7 @@ def read_study(
         seed=table.number("seed", 0, 2**63 - 1),
         factors=factors,
         cells=cells,
-        techniques=tuple(_condition(t, rendered=render is not None) for t in techniques),
+        techniques=tuple(_condition(t, render is not None, shared) for t in techniques),
         question=_question(wording.table("question")),
         scale=_scale(wording),
         familiarity=_familiarity(wording.table("familiarity")),
@@ -496,7 +497,8 @@ def _defaults() -> dict:
     return {key: thesis[key] for key in _WORDING}
 
 
-def _condition(table: Table, rendered: bool) -> Condition:
+def _condition(table: Table, rendered: bool, shared: dict) -> Condition:
+    """A technique of the study; shared: the parameters that all of them are given."""
     name, label = table.name("name"), table.text("label")
     if not rendered:
         return Condition(name, label, name)
@@ -504,7 +506,7 @@ def _condition(table: Table, rendered: bool) -> Condition:
         name,
         label,
         table.name("technique", default=name),
-        table.take("parameters", dict, default={}),
+        {**shared, **table.take("parameters", dict, default={})},
     )
 
 

@@ -15,7 +15,7 @@ import click
     metavar="NAME",
     help=(
         "One of 001-4.4, 001-4.5, 001-4.6, 000-2.14, 000-2.15, 000-2.17, 000-3.5, 000-3.6, "
-        "translucency; repeat for more. All if not given."
+        "translucency, transmittance; repeat for more. All if not given."
     ),
 )
 @click.option(

@@ -327,7 +327,51 @@ def translucency(photons: int, seed: int):
     return figure
 
 
+def transmittance_of_media(photons: int, seed: int):
+    """What slabs of three media let through, as a multiple of the albedo: Monte Carlo, which is the
+    default of all techniques, and what the others take in its place.
+    """
+    from renderer.optics import transmittance
+
+    plt = _pyplot()
+    shown = (("deon_luebke", 8.0), ("skin_three_layers", 8.0), ("marble", 20.0))
+    figure, axes = plt.subplots(3, 3, figsize=(10.5, 9.0))
+    for row, (medium, reach) in zip(axes, shown, strict=True):
+        s = np.linspace(0.0, reach, 300)
+        curves = {
+            f"{model}, {exponent}" if model == "jimenez" else model: transmittance.curve_of(
+                medium, model, exponent
+            )
+            for model, exponent in (
+                ("slab", ""),
+                ("jimenez", "exact"),
+                ("jimenez", "published"),
+                ("burley", ""),
+                ("multipole", ""),
+                ("beer", ""),
+            )
+        }
+        for c, (axis, (name, colour)) in enumerate(zip(row, CHANNELS, strict=True)):
+            for (label, curve), style in zip(curves.items(), ("-", "--", ":", "-", "-", ":")):
+                own = label == "slab"
+                tint = {"burley": "#e69f00", "multipole": "#56b4e9", "beer": "black"}
+                axis.plot(
+                    s,
+                    np.maximum(curve.at(s)[:, c], 1e-6),
+                    color=tint.get(label, colour),
+                    ls=style,
+                    lw=2.5 if own else 1.2,
+                    label="Monte Carlo of slabs" if own else label,
+                )
+            axis.set(yscale="log", ylim=(1e-3, 4), title=f"{medium}, {name}")
+            axis.set_xlabel("thickness (mm)")
+        row[0].set_ylabel("T over the albedo")
+    axes[0, 2].legend(fontsize=7)
+    return figure
+
+
 FIGURES = {
+    "transmittance": transmittance_of_media,
     "001-4.4": dipole_of_marble,
     "001-4.5": multipole_of_marble,
     "001-4.6": thin_marble,

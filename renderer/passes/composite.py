@@ -35,7 +35,7 @@ def composite(
     """
     width, height = surface.width, surface.height
     piece = piece or Piece(0, height, 0, height)
-    _, specular, albedo, depths, _ = surface.textures
+    _, specular, albedo, depths = surface.textures
     programs_uniforms = {
         "scattered": scattered,
         "scattered_row": piece.low - piece.first,

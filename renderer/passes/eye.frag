@@ -76,5 +76,4 @@ void main() {
     out_specular = vec4(specular, 1.0);
     out_albedo = vec4(albedo, 1.0);
     put_place(n);
-    out_transmitted = vec4(0.0);
 }

@@ -12,26 +12,25 @@ def draw_given(
     programs: Callable[..., gl.Program],
     into: gl.Target,
     irradiance: gl.Texture,
-    transmitted: gl.Texture,
+    transmitted: gl.Texture | None,
     albedo: gl.Texture,
     medium: int,
-    translucent: bool,
     texturing: float,
     first_row: int = 0,
 ) -> None:
     """Draw irradiance with alpha 1 where the medium scatters, 0 elsewhere.
 
-    medium: the id in irradiance's alpha; translucent: with the transmitted light added (Jimenez et
-    al. 2010: before scattering, not shadowed); texturing: times the albedo to this power;
-    first_row: of what is drawn, among the rows of the textures.
+    medium: the id in irradiance's alpha; transmitted: light that is added to it (Jimenez et al.
+    2010: before scattering, not shadowed); texturing: times the albedo to this power; first_row: of
+    what is drawn, among the rows of the textures.
     """
     into.bind()
     programs("passes/given.frag").use(
         irradiance=irradiance,
-        transmitted=transmitted,
+        transmitted=transmitted or irradiance,
         albedo=albedo,
         medium=float(medium),
-        through=float(translucent),
+        through=float(transmitted is not None),
         texturing=texturing,
         first_row=first_row,
     )

@@ -35,5 +35,7 @@ void main() {
     out_specular = vec4(specular + even + emission, 1.0);
     out_albedo = vec4(albedo, 1.0);
     put_place(n);
+#if DOMAIN != SCREEN
     out_transmitted = vec4(0.0);
+#endif
 }

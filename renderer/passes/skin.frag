@@ -1,9 +1,12 @@
-// Skin: colour and relief (procedural, from maps, or the one over the other), lamps, baked environment, transmission.
+// Skin: colour and relief (procedural, from maps, or the one over the other), lamps, baked environment.
 #include "shaders/common.glsl"
 #include "shaders/noise.glsl"
 #include "shaders/lighting.glsl"
 #include "shaders/diffuse.glsl"
 #include "passes/surface_out.glsl"
+#if DOMAIN != SCREEN
+#include "passes/transmission.glsl"
+#endif
 uniform vec3 eye_l; uniform vec3 eye_r; uniform vec3 mouth; uniform vec3 nose;
 uniform int procedural;
 uniform int has_albedo_map; uniform int has_normal_map; uniform int has_roughness_map; uniform int has_height_map; uniform int has_specular_map;
@@ -27,10 +30,6 @@ uniform vec4 lid_lines; uniform vec2 lid_lines_half; uniform float lid_lines_per
 uniform vec2 wrinkles_behind;  // the eyes: on the forehead, around the eyes
 uniform float material_id;           // 1, 2, ...: which medium scatters below; 0: none
 uniform vec3 noise_origin;           // mm: the seed's place in the solid noise
-uniform float gaussian_falloff[6];   // 1 / (2 variance), 1/mm^2
-uniform vec3 gaussian_weight[6];
-uniform float thickness_scale;       // mm of skin per mm of depth-map thickness
-uniform float transmission_wrap;
 
 float fade(float size_mm, float pixel_mm) { float r = pixel_mm / size_mm; return 1.0 / (1.0 + 6.0 * r * r); }
 
@@ -168,22 +167,6 @@ vec3 bumped(vec3 n) {
 
 float strength;  // of specular light, after its map
 
-vec3 transmitted(int lamp, vec3 p, vec3 n) {
-    // Jimenez et al. 2010, "Real-time realistic skin translucency", doi:10.1109/MCG.2010.39
-    vec3 inner = p - n * 0.6;
-    if (lamp_layer[lamp] < 0) return vec3(0.0);
-    int layer = layer_of(lamp, inner);
-    vec3 q = to_layer(layer, inner);
-    float scale = scale_of(lamp, layer, q.z);
-    vec3 total = vec3(0.0);
-    for (int k = 0; k < 8; ++k) {
-        float z = layer_depth(layer, q.xy + scale * 0.7 * vogel(k, 8, 0.0));
-        float thickness = max(q.z - z, 0.0) * thickness_scale;
-        for (int j = 0; j < 6; ++j) total += gaussian_weight[j] * exp(-thickness * thickness * gaussian_falloff[j]);
-    }
-    return total / 8.0 * clamp(transmission_wrap + dot(lamp_towards(lamp, p), -n), 0.0, 1.0) * lamp_light(lamp, p);
-}
-
 // The share of the light that the two lobes send back, of light from a direction or from everywhere.
 float sent_back(vec3 one, vec3 two) {
     float back = mix(dot(vec2(f0, 1.0), one.xy), dot(vec2(f0, 1.0), two.xy), lobe_share);
@@ -263,7 +246,7 @@ void main() {
     vec3 irradiance = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
     float nv = max(dot(n, v), 0.02);
     irradiance *= goes_in_even(nv, m);
-    vec3 specular = vec3(0.0), through = vec3(0.0);  // left out with DIFFUSE_ONLY
+    vec3 specular = vec3(0.0);  // left out with DIFFUSE_ONLY
     float wet = a.x;
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world);
@@ -276,9 +259,6 @@ void main() {
             specular += e * lobe * (1.0 - 0.5 * min(shade, 1.0)) * (1.0 - 0.85 * b.w);
 #endif
         }
-#ifndef DIFFUSE_ONLY
-        through += transmitted(k, world, smooth_n);
-#endif
     }
 #ifndef DIFFUSE_ONLY
     // panels in the mirror direction, shadowed by the baked openness
@@ -295,5 +275,11 @@ void main() {
     out_specular = vec4(strength * specular, 1.0);
     out_albedo = vec4(albedo, 1.0 - sent_back(nv, m));
     put_place(n);
+#if DOMAIN != SCREEN
+    vec3 through = vec3(0.0);
+#ifndef DIFFUSE_ONLY
+    for (int k = 0; k < lamps; ++k) through += transmitted(k, world, smooth_n);
+#endif
     out_transmitted = vec4(mask > 0.0 ? through * (1.0 - b.w) : vec3(0.0), 1.0);
+#endif
 }

@@ -4,8 +4,8 @@ layout(location = 0) out vec4 out_irradiance;    // rgb: E, alpha: the id of the
 layout(location = 1) out vec4 out_specular;      // rgb: radiance added after scattering
 layout(location = 2) out vec4 out_albedo;        // rgb: diffuse albedo, alpha: the share of it that gets out, not sent back
 layout(location = 3) out vec4 out_depth;  // screen: view depth in mm; else: normal in the world
-layout(location = 4) out vec4 out_transmitted;   // rgb: irradiance that comes through from behind
 #if DOMAIN != SCREEN
+layout(location = 4) out vec4 out_transmitted;   // rgb: irradiance that comes through from behind
 layout(location = 5) out vec4 out_position;      // xyz: mm in the world, alpha 1
 #endif
 uniform mat4 model;

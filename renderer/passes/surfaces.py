@@ -14,8 +14,9 @@ import numpy as np
 from renderer import gl
 from renderer.errors import InputError
 from renderer.gl import GL
-from renderer.optics import fits, media, surface
+from renderer.optics import media, surface
 from renderer.optics.curve import Curve
+from renderer.optics.transmittance import TABLE, Translucency, curve_of
 from renderer.passes.bake import Baked, bake, body
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
@@ -25,9 +26,10 @@ from renderer.scene.material import LAYERS, MAPS, MODELS, Material, Shading, Ski
 from renderer.scene.model import MASKS
 
 _HALF = GL.GL_RGBA16F
-#: Irradiance and the material's id; specular; albedo; view depth; what comes through.
-FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, GL.GL_R32F, _HALF)
-#: Over an atlas or points: the normal in the depth's stead, and the place in the world.
+#: Irradiance and the material's id; specular; albedo; view depth.
+FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, GL.GL_R32F)
+#: Over an atlas or points: the normal in the depth's stead, what comes through, the place in the
+#: world.
 PLACED_FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, _HALF, _HALF, GL.GL_RGBA32F)
 
 Program = Callable[..., gl.Program]
@@ -62,6 +64,7 @@ class Surfaces:
         bodies = [body(item) for item in items]
         baked = bake(bodies, lights, surroundings.radiance, rays, seed) if bodies else []
         self.media: list[str | dict] = []
+        self._transmittances: dict[tuple[int, str, str], tuple[gl.Texture, float]] = {}
         self.surfaces = [
             self._surface(item, b) for item, b in zip(contents.surfaces, baked, strict=False)
         ]
@@ -112,12 +115,14 @@ class Surfaces:
         points: Points | None = None,
         diffuse: str = "lambert",
         only_irradiance: bool = False,
+        translucency: Translucency | None = None,
     ) -> None:
         """Shade into the bound target: everything, or over a domain `only` one surface.
 
         shared: camera_position, view, projection (and point_mm for POINTS); points: those of the
         domain POINTS; diffuse: how light passes the face (renderer.optics.surface);
-        only_irradiance: without specular and transmitted light.
+        only_irradiance: without specular and transmitted light; translucency: how what comes
+        through is reckoned, over other domains than the screen.
         """
         defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": domain}
         values = {**shared, **lamps.uniforms(), **surroundings.uniforms(), "face_table": self.face}
@@ -132,7 +137,8 @@ class Surfaces:
             shader = "passes/local.frag" if local else "passes/skin.frag"
             vertex = "passes/surface.vert" if points is None else "shaders/fullscreen.vert"
             program = programs(shader, own, vertex=vertex)
-            program.use(**program.accepts({**values, **self._material(drawn)}))
+            through = self._through(drawn, translucency)
+            program.use(**program.accepts({**values, **self._material(drawn), **through}))
             if points is None:
                 drawn.mesh.draw()
             else:
@@ -157,13 +163,56 @@ class Surfaces:
             program.use(**program.accepts({**values, **own}))
             drawn.mesh.draw()
 
+    def draw_transmitted(
+        self,
+        programs: Program,
+        lamps: Lamps,
+        surroundings: Surroundings,
+        shared: dict,
+        translucency: Translucency,
+    ) -> None:
+        """What comes through the surfaces that scatter, over the screen, into the bound target."""
+        defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": "SCREEN"}
+        program = programs("passes/transmitted.frag", defines, vertex="passes/surface.vert")
+        values = {**shared, **lamps.uniforms(), **surroundings.uniforms()}
+        for drawn in self.surfaces:
+            if drawn.id:
+                through = self._through(drawn, translucency)
+                own = {**values, "model": drawn.item.pose, **through}
+                program.use(**program.accepts(own))
+                drawn.mesh.draw()
+
+    def _through(self, drawn: Drawn, translucency: Translucency | None) -> dict:
+        """The uniforms of passes/transmission.glsl for a surface."""
+        if not translucency or not drawn.id:
+            return {
+                "transmittance": self.face,
+                "transmittance_reach": 0.0,
+                "thickness_scale": 0.0,
+                "transmission_wrap": 0.0,
+            }
+        key = (drawn.id, translucency.model, translucency.exponent)
+        if key not in self._transmittances:
+            medium = self.media[drawn.id - 1]
+            found = curve_of(medium, translucency.model, translucency.exponent)
+            table = np.ones((1, TABLE, 4), np.float32)
+            table[0, :, :3] = found.table()
+            texture = gl.Texture(TABLE, 1, GL.GL_RGBA32F, linear=True, data=table)
+            self._transmittances[key] = (texture, found.reach_mm)
+        texture, reach_mm = self._transmittances[key]
+        return {
+            "transmittance": texture,
+            "transmittance_reach": reach_mm,
+            "thickness_scale": translucency.thickness_scale,
+            "transmission_wrap": translucency.wrap,
+        }
+
     def _material(self, drawn: Drawn) -> dict:
         """The uniforms of a surface's material."""
         part = drawn.item.primitive
         material, marks = part.material.value, part.landmarks
         skin = material if isinstance(material, Skin) else Skin()
         rng = np.random.default_rng([self.seed, 3])
-        through = fits.gaussian_sum(self.curve(max(drawn.id, 1)), 6)
         nowhere = np.zeros(3)
         layers = skin.map_layers if "albedo_map" in part.material.maps else LAYERS
         return {
@@ -213,10 +262,6 @@ class Surfaces:
             "lip_folds": skin.lip_folds,
             "roughness_dry": skin.roughness_dry,
             "roughness_oily": skin.roughness_oily,
-            "gaussian_falloff": 0.5 / through.variance_mm2,
-            "gaussian_weight": through.weights,
-            "thickness_scale": material.thickness_scale,
-            "transmission_wrap": material.transmission_wrap,
             **(_local(material) if isinstance(material, Shading) else {}),
         }
 

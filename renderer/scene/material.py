@@ -54,20 +54,6 @@ class Material(Parameters):
         (0.85, 1.5), unit="of the roughness", low=0.1, high=3.0, source="chosen by eye"
     )
     lobe_share: float = parameter(0.25, source="of the second lobe, chosen by eye", **_SHARE)
-    thickness_scale: float = parameter(
-        0.38,
-        unit="mm of slab per mm of a lamp's depth map",
-        low=0.0,
-        high=100.0,
-        source="chosen by eye; 1 is exact for a flat part",
-    )
-    transmission_wrap: float = parameter(
-        0.10,
-        unit="added to the cosine",
-        low=0.0,
-        high=1.0,
-        source="chosen by eye; 0 is exact, the published shader uses 0.3",
-    )
     albedo_map: str = ""
     normal_map: str = ""
     roughness_map: str = ""
@@ -321,6 +307,9 @@ class Shading(Material):
         return self.albedo if self.k_a is None else self.k_a
 
 
+#: Keys of materials of the first edition that are parameters of the techniques now.
+MOVED = {"thickness_scale": "thickness_scale", "transmission_wrap": "translucency_wrap"}
+
 MATERIALS: dict[str, type[Material]] = {kind.kind: kind for kind in (Material, Skin, Shading)}
 
 
@@ -331,4 +320,8 @@ def read_material(table: Mapping[str, Any], where: str) -> Material:
     kind = table.get("kind", "plain")
     if kind not in MATERIALS:
         raise InputError(f"{where}.kind is {kind!r:.60}; expected one of {', '.join(MATERIALS)}")
+    for key in MOVED.keys() & table.keys():
+        raise InputError(
+            f"{where}.{key} is unknown; expected the parameter {MOVED[key]} of a technique"
+        )
     return MATERIALS[kind].read({k: v for k, v in table.items() if k != "kind"}, where)

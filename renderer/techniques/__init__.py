@@ -10,6 +10,7 @@ from renderer.techniques.base import Technique
 from renderer.techniques.borshukov_lewis import BorshukovLewis
 from renderer.techniques.deon_luebke import DeonLuebke
 from renderer.techniques.golubev import Golubev
+from renderer.techniques.golubev_adaptive import GolubevAdaptive
 from renderer.techniques.golubev_plus import GolubevPlus
 from renderer.techniques.gosselin import Gosselin
 from renderer.techniques.jimenez_gaussian import JimenezGaussian
@@ -24,6 +25,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "jimenez_separable": JimenezSeparable,
     "golubev": Golubev,
     "golubev_plus": GolubevPlus,
+    "golubev_adaptive": GolubevAdaptive,
     "borshukov_lewis": BorshukovLewis,
     "gosselin": Gosselin,
     "deon_luebke": DeonLuebke,
@@ -37,11 +39,27 @@ def make(name: str, parameters: dict | None = None) -> Technique:
     if name not in TECHNIQUES:
         raise InputError(f"no technique {name!r}; expected one of {', '.join(TECHNIQUES)}")
     kind = TECHNIQUES[name]
+    parameters = _of_first_edition(kind, parameters or {})
     known = kind.names()
-    for key in parameters or {}:
+    for key in parameters:
         if key not in known:
             raise InputError(
                 f"{name} has no parameter {key!r}; expected one of "
                 f"{', '.join(known) or 'none at all'}"
             )
-    return kind(**(parameters or {}))
+    return kind(**parameters)
+
+
+def _of_first_edition(kind: type[Technique], parameters: dict) -> dict:
+    """`translucent = true | false`, as studies of the first edition have it, as translucency."""
+    if "translucent" not in parameters:
+        return parameters
+    on, others = parameters["translucent"], {**parameters}
+    del others["translucent"]
+    if not isinstance(on, bool) or "translucency" in parameters:
+        raise InputError(
+            f"{kind.name}.translucent is {on!r:.60}; expected true or false, and no translucency "
+            "beside it"
+        )
+    usual = kind().translucency
+    return {**others, "translucency": (usual if usual != "none" else "slab") if on else "none"}

@@ -40,7 +40,7 @@ class Atlas(Drawing):
         self.room, self.drawn, self.size = room, drawn, size
         self.light: gl.Texture
 
-    def draw_light(self, translucent: bool, texturing: float) -> None:
+    def draw_light(self, texturing: float) -> None:
         """Irradiance, places and the size of texels."""
         self._refuse_overlap()
         with self.room.placed(self.drawn, "ATLAS", (self.size, self.size)) as lit:
@@ -51,7 +51,6 @@ class Atlas(Drawing):
                 self.inputs.programs,
                 light,
                 *(irradiance, transmitted, albedo, self.room.medium),
-                translucent,
                 texturing,
             )
             self.light = self.given["light"] = light.textures[0]
@@ -115,10 +114,6 @@ class AtlasTechnique(Technique):
         """The filtered light: RGBA, alpha 1 where the medium scatters."""
         raise NotImplementedError(f"{self.name} has no filter")
 
-    def with_depths(self) -> bool:
-        """Whether light that comes through by the lamps' depth maps is filtered too."""
-        return self.translucent
-
     def taps(self) -> int:
         """Texture reads that a texel takes."""
         raise NotImplementedError(f"{self.name} does not count")
@@ -136,7 +131,7 @@ class AtlasTechnique(Technique):
     def _one(self, inputs: Inputs, room: Room, drawn: Drawn, target: gl.Target) -> None:
         """Filter one surface's light and draw it where the surface is seen."""
         with Atlas(inputs, room, drawn, self.size) as atlas:
-            atlas.draw_light(self.with_depths(), self.texturing)
+            atlas.draw_light(self.texturing)
             filtered = self.filter(atlas)
             if self.padding:
                 padded = atlas.target()

@@ -10,6 +10,7 @@ import numpy as np
 from renderer.errors import InputError
 from renderer.optics.curve import Curve, edge_error
 from renderer.optics.surface import DIFFUSE
+from renderer.optics.transmittance import EXPONENTS, MODELS, Translucency
 from renderer.parameters import Parameters, parameter
 
 if TYPE_CHECKING:
@@ -94,18 +95,42 @@ class Scattered:
 class Technique(Parameters):
     """Base of all techniques.
 
-    translucent: light that comes through thin parts is added before scattering (Jimenez et al.
-    2010). texturing: the share of the albedo's exponent that is applied before scattering: 0
-    post-scatter, 1 pre-scatter, 0.5 both. diffuse: how light passes the rough face on its way in
-    and out. `measures_contrast`: it writes contrast. Kernels are
-    fitted to the medium's curve: `edge` is what the kernel for a curve answers to a straight edge,
-    and `fit_error` how far that is from the curve's own answer.
+    translucency: the transmittance of thin parts by which light that comes through them is reckoned
+    (renderer.optics.transmittance); it is added before scattering (Jimenez et al. 2010).
+    translucency_exponent, translucency_wrap and thickness_scale are its details. texturing: the
+    share of the albedo's exponent that is applied before scattering: 0 post-scatter, 1 pre-scatter,
+    0.5 both; each technique's default is its authors'. diffuse: how light passes the rough face on
+    its way in and out. `measures_contrast`: it writes contrast. Kernels are fitted to the medium's
+    curve: `edge` is what the kernel for a curve answers to a straight edge, and `fit_error` how far
+    that is from the curve's own answer.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     paper: ClassVar[str]
-    translucent: bool = parameter(True, source="Jimenez et al. 2010, doi:10.1109/MCG.2010.39")
+    translucency: str = parameter(
+        "slab",
+        choices=MODELS,
+        source="Monte Carlo of slabs of the medium; Jimenez et al. 2010, Burley 2015, Donner and "
+        "Jensen 2005, Green 2004",
+    )
+    translucency_exponent: str = parameter(
+        "exact", choices=EXPONENTS, source="Jimenez et al. 2010, eq. 3: published, exp(-s^2 / v)"
+    )
+    translucency_wrap: float = parameter(
+        0.0,
+        unit="added to the cosine",
+        low=0.0,
+        high=1.0,
+        source="0 is exact; 0.3 in the shader of Jimenez et al. 2010",
+    )
+    thickness_scale: float = parameter(
+        1.0,
+        unit="mm of the medium per mm of thickness in a depth map",
+        low=0.0,
+        high=100.0,
+        source="1 is exact for a flat part",
+    )
     texturing: float = parameter(
         0.0,
         unit="of the albedo's exponent before scattering",
@@ -122,6 +147,14 @@ class Technique(Parameters):
     measures_contrast: ClassVar[bool] = False
     #: What it filters: the picture ("screen"), texture atlases ("atlas"), points ("points").
     domain: ClassVar[str] = "screen"
+
+    @property
+    def transmission(self) -> Translucency | None:
+        """What light through thin parts the passes are asked for; None for none."""
+        if self.translucency not in MODELS or self.translucency == "none":
+            return None
+        details = (self.translucency_exponent, self.translucency_wrap, self.thickness_scale)
+        return Translucency(self.translucency, *details)
 
     @classmethod
     def where(cls, field: str) -> str:

@@ -19,6 +19,7 @@ import numpy as np
 
 from renderer import gl
 from renderer.gl import GL
+from renderer.optics.transmittance import MODELS
 from renderer.parameters import parameter
 from renderer.scene.lights import PointLight
 from renderer.techniques.atlas import Atlas
@@ -35,10 +36,9 @@ class DeonLuebke(AtlasGaussians):
 
     kernel "fitted": `terms` Gaussians nearest to the medium's curve; "published": the chapter's
     six, whatever the medium. first "blurred": the narrowest Gaussian is as wide as it is;
-    "published": it is the map itself. through "maps": the chapter's modified translucent shadow
-    maps, for lamps that cast shadows; "depths": what the other techniques get, from the lamps'
-    depth maps. translucent = false leaves both out. stretch "blurred": the stretch map is blurred
-    along with the light.
+    "published": it is the map itself. translucency "maps": the chapter's modified translucent
+    shadow maps, for lamps that cast shadows; the others are what all techniques can have. stretch
+    "blurred": the stretch map is blurred along with the light.
     """
 
     kernel: str = parameter(
@@ -58,7 +58,9 @@ class DeonLuebke(AtlasGaussians):
     stretch: str = parameter(
         "corrected", choices=("corrected", "blurred", "none"), source="GPU Gems 3, sec. 14.4.3"
     )
-    through: str = parameter("maps", choices=("maps", "depths"), source="GPU Gems 3, sec. 14.5.3")
+    translucency: str = parameter(
+        "maps", choices=("maps", *MODELS), source="GPU Gems 3, sec. 14.5.3"
+    )
     through_terms: int = parameter(
         3,
         unit="Gaussians, the widest",
@@ -88,9 +90,6 @@ class DeonLuebke(AtlasGaussians):
     title: ClassVar[str] = "d'Eon-Luebke"
     paper: ClassVar[str] = "d'Eon and Luebke 2007, GPU Gems 3, ch. 14"
 
-    def with_depths(self) -> bool:
-        return self.translucent and self.through == "depths"
-
     def filter(self, atlas: Atlas) -> gl.Texture:
         fit = self.fit(atlas.inputs.curve)
         blurs, unblurred = self.blurs(fit)
@@ -117,7 +116,7 @@ class DeonLuebke(AtlasGaussians):
     def _ways_through(self, atlas: Atlas) -> Iterator[tuple[gl.Texture, gl.Texture | None]]:
         """exp(-falloff thickness) and where light enters, over the atlas; None: no way through."""
         lamps = atlas.room.lamps
-        if not (self.translucent and self.through == "maps" and lamps.layers):
+        if not (self.translucency == "maps" and lamps.layers):
             yield atlas.light, None
             return
         programs = atlas.inputs.programs

@@ -28,6 +28,9 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
     depth of one metre) tuned for its camera. first "blurred": the narrowest Gaussian is as wide as
     it is; "published": it is the unblurred image. stretch "geometry": taps come closer by the true
     foreshortening of the surface; "published": by alpha / (depth + beta |d depth|) of eq. 3.
+    depth_steps "leak": nothing but the stretch keeps light from crossing a step of depth, as in the
+    paper; "follow": taps give way to the pixel where depth leaves its surface by follow_surface_mm,
+    the remedy that the authors published with their later filters.
     """
 
     kernel: str = parameter(
@@ -50,6 +53,25 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
     beta: float = parameter(800.0, unit="px", low=0.0, high=1e5, source="Jimenez 2009, eq. 3")
     gradient_limit: float = parameter(
         0.001, unit="m/px", low=0.0, high=1.0, source="published shader SSSSS.fx"
+    )
+    depth_steps: str = parameter(
+        "leak",
+        choices=("leak", "follow"),
+        source="Jimenez 2009: leak; Jimenez et al. 2012 to 2015, published code: follow",
+    )
+    follow_surface_mm: float = parameter(
+        5.0,
+        unit="mm",
+        low=0.01,
+        high=1000.0,
+        source="code of 2012: saturate(300 dist sssWidth |dz|) is 1 at about 5 mm",
+    )
+    texturing: float = parameter(
+        1.0,
+        unit="of the albedo's exponent before scattering",
+        low=0.0,
+        high=1.0,
+        source="published code of 2009: the albedo is in the light that is blurred",
     )
 
     name: ClassVar[str] = "jimenez_gaussian"
@@ -77,6 +99,7 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
             "beta": self.beta,
             "gradient_limit": self.gradient_limit,
             "supersample": float(inputs.supersample),
+            "follow": 1 / self.follow_surface_mm if self.depth_steps == "follow" else 0.0,
         }
         row, blurred = canvas.target(), canvas.target()
         start = {"light": inputs.irradiance, "unblurred": unblurred, "samples": self.reads()}

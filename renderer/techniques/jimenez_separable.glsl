@@ -1,6 +1,5 @@
 // One of the two passes of the separable kernel.
-#include "shaders/common.glsl"
-#include "shaders/screen.glsl"
+#include "shaders/rotation.glsl"
 uniform sampler2D source; uniform sampler2D irradiance; uniform sampler2D depths;
 uniform vec4 kernel[TAPS];       // rgb weight, offset in mm
 uniform int taps;                // no constant: an unrolled loop would run for pixels without skin too
@@ -22,12 +21,11 @@ void main() {
     if (texelFetch(irradiance, at, 0).a < 0.5) return;
     vec2 uv = image_pixel() / image_size;
     float scale = pixels_per_mm / depth;
-    float angle = 2.0 * PI * interleaved_gradient_noise(image_pixel());
-    mat2 turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
+    mat2 rotated = rotation();
     vec3 sum = vec3(0.0);
     for (int k = 0; k < taps; ++k) {
         float offset = kernel[k].w;
-        vec2 direction = abs(offset) < near_mm ? turn * axis : axis;
+        vec2 direction = abs(offset) < near_mm ? rotated * axis : axis;
         float tangent = dot(slope, direction) * scale;
         vec2 apart = direction * offset * scale * inversesqrt(1.0 + tangent * tangent);
         vec2 there = uv + apart / image_size;

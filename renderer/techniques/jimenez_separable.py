@@ -8,26 +8,58 @@ near taps are rotated by a per-pixel angle that both passes share.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
 
+from renderer.errors import InputError
+from renderer.optics import fits, gaussians, separable
 from renderer.optics.curve import Curve
 from renderer.optics.separable import demo_kernel, tap_edges, tap_offsets
 from renderer.parameters import parameter
 from renderer.techniques.base import odd
-from renderer.techniques.screen import Canvas, ScreenTechnique
+from renderer.techniques.rotated import RotatedTechnique
+from renderer.techniques.screen import Canvas
 
 MOST_TAPS = 41
+KERNELS = ("preintegrated", "guided", "svd", "artist", "published")
+GRID = 100  # steps of the half-line on which svd and guided kernels are found
 REACH_SHARE = 0.993  # of the widest channel's light: 6 mm for d'Eon and Luebke's skin
 
 
+@lru_cache(maxsize=32)
+def kernels(curve: Curve, kind: str, guide_k: float) -> list[separable.Kernel]:
+    """The kernel of each channel by one of "guided", "svd" and "artist", of the six Gaussians
+    nearest to the curve (whose own rings are too noisy near the middle to be decomposed).
+    """
+    fit = fits.gaussian_sum(curve, 6)
+    found = []
+    for c in range(curve.channels):
+        share, radius = curve._quantiles(c)
+        reach = float(np.interp(REACH_SHARE, share, radius))
+
+        def profile(r: np.ndarray, c: int = c) -> np.ndarray:
+            return gaussians.reflectance(r, fit.variance_mm2, fit.weights[:, c])
+
+        if kind == "guided":
+            found.append(separable.guided(profile, reach, guide_k, GRID))
+        elif kind == "svd":
+            found.append(separable.svd(profile, reach, GRID))
+        else:
+            found.append(separable.artist_fit(profile, reach, GRID)[0])
+    return found
+
+
 @dataclass(frozen=True)
-class JimenezSeparable(ScreenTechnique):
+class JimenezSeparable(RotatedTechnique):
     """The 2015 filter.
 
     kernel "preintegrated": the paper's analytic pre-integration, of the medium's own curve;
-    "published": the artist's kernel of the published code, whatever the medium. follow "plane":
+    "guided": its optimised one, which cares for the tail by guide_k; "svd": the rank-one part of
+    the decomposition, whose lost energy is given back over all taps; "artist": two Gaussians a
+    channel, fitted unless all of near_mm, far_mm and near_weight are given; "published": the kernel
+    of the published code, whatever the medium. follow "plane":
     taps keep their millimetres on a tilted surface and give way where depth leaves its plane;
     "published": where depth leaves that of the pixel, as in the code.
     """
@@ -36,9 +68,34 @@ class JimenezSeparable(ScreenTechnique):
         25, unit="taps a pass", low=3, high=MOST_TAPS, source="published code: 11, 17 or 25"
     )
     kernel: str = parameter(
-        "preintegrated",
-        choices=("preintegrated", "published"),
-        source="Jimenez 2015, sec. 5.1 and code",
+        "preintegrated", choices=KERNELS, source="Jimenez 2015, sec. 4 and 5, and published code"
+    )
+    guide_k: float = parameter(
+        2.0, unit="power of r", low=0.0, high=8.0, source="Jimenez 2015, eq. 6: 2; 0: the peak"
+    )
+    near_mm: tuple[float, float, float] | None = parameter(
+        (None, (0.1, 0.1, 0.1)),
+        unit="mm, sigma per channel",
+        low=1e-3,
+        high=100.0,
+        source="the artist's choice",
+        optional=True,
+    )
+    far_mm: tuple[float, float, float] | None = parameter(
+        (None, (1.0, 1.0, 1.0)),
+        unit="mm, sigma per channel",
+        low=1e-3,
+        high=100.0,
+        source="the artist's choice",
+        optional=True,
+    )
+    near_weight: tuple[float, float, float] | None = parameter(
+        (None, (0.5, 0.5, 0.5)),
+        unit="of the near Gaussian",
+        low=0.0,
+        high=1.0,
+        source="the artist's choice",
+        optional=True,
     )
     reach_mm: float | None = parameter(
         (None, 6.0),
@@ -70,6 +127,13 @@ class JimenezSeparable(ScreenTechnique):
         high=1.0,
         source="Jimenez 2015, sec. 6: 10 %, 30 % in extreme close-up",
     )
+    texturing: float = parameter(
+        1.0,
+        unit="of the albedo's exponent before scattering",
+        low=0.0,
+        high=1.0,
+        source="published code of 2012: the albedo is in the light that is blurred",
+    )
 
     name: ClassVar[str] = "jimenez_separable"
     title: ClassVar[str] = "Separable"
@@ -78,6 +142,12 @@ class JimenezSeparable(ScreenTechnique):
     def __post_init__(self) -> None:
         super().__post_init__()
         odd(self.where("taps"), self.taps)
+        given = [value is not None for value in (self.near_mm, self.far_mm, self.near_weight)]
+        if any(given) and not (all(given) and self.kernel == "artist"):
+            raise InputError(
+                f"{self.name} has some of near_mm, far_mm and near_weight; expected all three, and "
+                "kernel = 'artist'"
+            )
 
     def kernel_table(self, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
         """Offsets (taps,) mm and weights (taps, 3) that sum to 1 per channel."""
@@ -89,7 +159,18 @@ class JimenezSeparable(ScreenTechnique):
             reach = max(float(np.interp(REACH_SHARE, *quantile)) for quantile in quantiles)
         offsets = tap_offsets(self.taps, reach)
         edges = np.clip(tap_edges(offsets), -1e6, 1e6)
-        return offsets, curve.line_integral(edges[:-1], edges[1:])
+        if self.kernel == "preintegrated":
+            return offsets, curve.line_integral(edges[:-1], edges[1:])
+        if self.near_mm is not None:
+            weights = np.empty((self.taps, len(self.near_mm)))
+            for c, (near, far, w) in enumerate(
+                zip(self.near_mm, self.far_mm, self.near_weight, strict=True)
+            ):
+                pair = (np.array([near, far]) ** 2, np.array([[w], [1 - w]]))
+                weights[:, c] = gaussians.line_integral(edges[:-1], edges[1:], *pair)[:, 0]
+            return offsets, weights
+        found = kernels(curve, self.kernel, self.guide_k)
+        return offsets, np.stack([kernel.taps(offsets) for kernel in found], axis=1)
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         """Each tap stands for its interval: rotation and bilinear texels spread it so."""

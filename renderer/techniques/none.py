@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from renderer.optics.curve import Curve
+from renderer.optics.transmittance import MODELS
 from renderer.parameters import parameter
 from renderer.techniques.screen import ScreenTechnique
 
@@ -19,7 +20,9 @@ class NoScattering(ScreenTechnique):
     name: ClassVar[str] = "none"
     title: ClassVar[str] = "No SSS"
     paper: ClassVar[str] = "Lambert 1760, Photometria"
-    translucent: bool = parameter(False, source="light that comes through is scattered light")
+    translucency: str = parameter(
+        "none", choices=MODELS, source="light that comes through is scattered light"
+    )
 
     def support_mm(self, curve: Curve) -> float:
         return 0.0

@@ -134,7 +134,6 @@ class PointsTechnique(Technique):
                     inputs.programs,
                     light,
                     *from_scene,
-                    self.translucent,
                     self.texturing,
                 )
                 sums.bind(blend="add")

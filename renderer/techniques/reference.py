@@ -48,8 +48,8 @@ class Reference(Technique):
         high=20.0,
         source="denoised: what even light gives is averaged over so much, docs/reference.md",
     )
-    translucent: bool = parameter(
-        False, choices=(False,), source="walks go through thin parts: nothing is to be added"
+    translucency: str = parameter(
+        "none", choices=("none",), source="walks go through thin parts: nothing is to be added"
     )
 
     domain: ClassVar[str] = "walks"

@@ -47,7 +47,11 @@ class ScreenTechnique(Technique):
         uniforms = self.uniforms(canvas.inputs)
         canvas.draw(canvas.result, self.file(), self.defines(), **uniforms)
 
+    def draw(self, canvas: Canvas) -> None:
+        """Draw into canvas.result: the passes once; a base that needs them oftener overrides it."""
+        self.passes(canvas)
+
     def scatter(self, inputs: Inputs) -> Scattered:
         with result(inputs) as target, Canvas(inputs, target) as canvas:
-            self.passes(canvas)
+            self.draw(canvas)
         return Scattered(target)

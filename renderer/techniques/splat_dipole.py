@@ -14,6 +14,7 @@ import numpy as np
 
 from renderer.optics import fits
 from renderer.optics.curve import Curve
+from renderer.optics.transmittance import MODELS
 from renderer.parameters import parameter
 from renderer.techniques.points import PointsTechnique
 
@@ -28,7 +29,9 @@ class SplatDipole(PointsTechnique):
     itself, so that no other translucency is added.
     """
 
-    translucent: bool = parameter(False, source="Rohat 2012: distances go through the object")
+    translucency: str = parameter(
+        "none", choices=MODELS, source="Rohat 2012: distances go through the object"
+    )
     radius: str = parameter(
         "area", choices=("area", "published"), source="Rohat 2012, sec. 4.3: over r alone"
     )

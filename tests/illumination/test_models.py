@@ -29,7 +29,7 @@ TINTED = {
 
 def radiance(frame):
     """(radiance (H, W, 3), where a surface is seen (H, W)) of a frame before any tone map."""
-    light, specular, albedo, depth, _ = (t.read().copy() for t in frame.surface.textures)
+    light, specular, albedo, depth = (t.read().copy() for t in frame.surface.textures)
     return albedo[..., :3] * light[..., :3] / np.pi + specular[..., :3], depth[..., 0] > 0
 
 

@@ -12,6 +12,7 @@ from stimuli.heads import fetch
 from stimuli.heads.default_head import default_model
 from stimuli.heads.person import Person
 from stimuli.parts import PEOPLE, read_toml
+from tests.renderer.slab import Bare
 
 SIZE = (320, 180)
 
@@ -40,6 +41,14 @@ MAN = Person.read(read_toml(PEOPLE / "man.toml"), "man")
 def stand():
     """stand(model, **patch) -> graph: the model in the studio."""
     return studio
+
+
+@pytest.fixture(scope="session")
+def bare():
+    """A context without a scene: pictures that techniques filter."""
+    found = Bare()
+    yield found
+    found.context.close()
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,41 @@ BALL = {
 }
 
 
+class Bare:
+    """A context and its programs, without a scene."""
+
+    def __init__(self):
+        self.context = gl.Context()
+        self._programs = {}
+
+    def program(self, fragment, defines=None):
+        key = (fragment, tuple(sorted((defines or {}).items())))
+        if key not in self._programs:
+            self._programs[key] = gl.Program(fragment, defines=defines)
+        return self._programs[key]
+
+    def flat(self, light, curve, depth_mm=400.0, pixels_per_mm=1800.0):
+        """Inputs of a picture that faces the camera: light (H, W, 3), depth_mm one or (H, W)."""
+        self.context.make_current()
+        height, width = light.shape[:2]
+        colour = np.dstack([light, np.ones((height, width))]).astype(np.float32)
+        depth = np.zeros((height, width, 4), np.float32)
+        depth[..., 0] = depth_mm
+        textures = [
+            gl.Texture(width, height, gl.GL.GL_RGBA32F, data=np.ascontiguousarray(data[::-1]))
+            for data in (colour, depth)
+        ]
+        size = (width, height, pixels_per_mm)
+        return Inputs(self.context, self.program, *textures, *size, 1, curve)
+
+
+def scatter(technique, inputs):
+    """Scattered irradiance (H, W, 3) and samples and contrast (H, W, ...), row 0 at the top."""
+    with technique.scatter(inputs).target as target:
+        light, count = (texture.read().copy() for texture in target.textures)
+    return light[..., :3], count
+
+
 @contextmanager
 def frame_of_ball(size):
     """A frame of a ball alone, under one lamp."""

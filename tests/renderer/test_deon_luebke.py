@@ -19,7 +19,7 @@ from tests.renderer.slab import (
 )
 from tests.renderer.test_techniques import SKIN
 
-OPTIONS = {"size": 1024, "texturing": 0.0, "translucent": False}
+OPTIONS = {"size": 1024, "texturing": 0.0, "translucency": "none"}
 TECHNIQUE = renderer.make("deon_luebke", OPTIONS)
 
 

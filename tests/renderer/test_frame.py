@@ -12,6 +12,7 @@ from PIL import Image
 import renderer
 from renderer.errors import InputError
 from renderer.gl import Program
+from renderer.optics.transmittance import Translucency
 
 
 def no_skin(result, supersample=2):
@@ -74,14 +75,14 @@ def test_samples_are_counted(results):
 def test_the_light_that_comes_through_is_added_for_scattering_techniques_alone(frames, drawing):
     drawing.context.make_current()
     frame = frames["close-up"]
-    plain, lit = frame.irradiance(False).read(), frame.irradiance(True).read()
+    plain, lit = frame.irradiance().read(), frame.irradiance(Translucency()).read()
     mask = plain[..., 3] > 0
     np.testing.assert_array_equal(plain[~mask], lit[~mask])
     gain = (lit - plain)[mask][:, :3]
-    assert (gain >= 0).all() and gain[:, 0].max() > 0.3 and gain[:, 0].sum() > 2 * gain[:, 2].sum()
-    without = {name for name in renderer.TECHNIQUES if not renderer.make(name).translucent}
-    # to splats and walks, light comes through by distance
-    assert without == {"none", "splat_dipole", "reference"}
+    assert (gain >= 0).all() and gain[:, 0].max() > 0.1 and gain[:, 0].sum() > 2 * gain[:, 2].sum()
+    without = {name for name in renderer.TECHNIQUES if renderer.make(name).transmission is None}
+    # to splats and walks, light comes through by distance; deon_luebke has maps of its own
+    assert without == {"none", "splat_dipole", "reference", "deon_luebke"}
 
 
 def test_texturing_before_and_after_agree_where_nothing_is_to_blur(frames):
@@ -107,10 +108,10 @@ def test_texturing_before_and_after_agree_where_nothing_is_to_blur(frames):
 def test_translucency_is_a_parameter(frames):
     frame = frames["close-up"]
     lit, dull = (
-        frame.render(renderer.make("golubev", {"translucent": on})).image.astype(int)
-        for on in (True, False)
+        frame.render(renderer.make("golubev", {"translucency": model})).image.astype(int)
+        for model in ("slab", "none")
     )
-    assert (lit - dull)[..., 0].max() > 20 and (lit >= dull - 1).all()
+    assert (lit - dull)[..., 0].max() > 10 and (lit >= dull - 1).all()
 
 
 def test_a_frame_drawn_twice_has_the_same_bytes(model, stand, results):

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 import renderer
+from renderer.optics.transmittance import Translucency
 from renderer.passes import pieces as cutting
 from renderer.passes.pieces import PIECE_PIXELS, Piece, pieces
 from tests.renderer.slab import frame_of_ball
 
-#: Bytes a pixel: irradiance 16, specular, albedo and transmitted light 8 each, depths and depth
-#: buffer 4 + 4; of a piece, light 16, depth 4, result 20, and two targets of a filter.
+#: Bytes a pixel: irradiance 16, specular, albedo and, once it is asked for, transmitted light 8
+#: each, depths and depth buffer 4 + 4; of a piece, light 16, depth 4, result 20, and two targets of
+#: a filter.
 FRAME_BYTES, PIECE_BYTES = 48, 72
 
 
@@ -64,8 +66,10 @@ def test_a_frame_and_its_pieces_hold_what_is_reckoned_and_free_it(frames, drawin
     context, pixels = drawing.context, 640 * 360
     monkeypatch.setattr(cutting, "PIECE_PIXELS", pixels // 2)
     context.make_current()
+    frames["close-up"].transmitted(Translucency())  # its table is kept with the scene
     before = context.held
     with drawing.frame(renderer.FRAMINGS["half-length"]) as frame:
+        frame.transmitted(Translucency())
         shared = context.held
         assert shared - before <= FRAME_BYTES * pixels
         for name in ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian"):

@@ -3,7 +3,8 @@
 import numpy as np
 
 import renderer
-from tests.renderer.test_techniques import SKIN, scatter
+from tests.renderer.slab import scatter
+from tests.renderer.test_techniques import SKIN
 
 
 def test_light_comes_out_as_it_went_in(patch):

@@ -246,5 +246,5 @@ def test_the_technique_walks_where_the_medium_is(ball):
 def test_bad_parameters():
     with pytest.raises(InputError, match="walks is 3; expected an even number"):
         renderer.make("reference", {"walks": 3})
-    with pytest.raises(InputError, match="translucent is True; expected one of False"):
+    with pytest.raises(InputError, match="translucency is 'slab'; expected one of 'none'"):
         renderer.make("reference", {"translucent": True})

@@ -11,8 +11,8 @@ from scipy.special import erfc
 from renderer.gl import program
 from renderer.parameters import parameter
 from renderer.techniques.screen import ScreenTechnique
-from tests.renderer.slab import edge_response
-from tests.renderer.test_techniques import SKIN, scatter
+from tests.renderer.slab import edge_response, scatter
+from tests.renderer.test_techniques import SKIN
 
 PAGE = Path(__file__).resolve().parents[2] / "CONTRIBUTING.md"
 

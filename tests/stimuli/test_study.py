@@ -9,6 +9,7 @@ from stimuli.errors import InputError
 from stimuli.scenes import load_table, read_scene
 from stimuli.study import THESIS, Study, load_study, read_study
 from stimuli.table import Table
+from tests.stimuli.conftest import TOML
 
 
 def test_thesis_study():
@@ -41,6 +42,15 @@ def test_technique_and_parameters_of_a_condition(small_study):
     plain, soft = small_study.techniques
     assert (plain.technique, plain.parameters) == ("plain", {})
     assert (soft.technique, soft.parameters) == ("blur", {"radius_mm": 2.5})
+
+
+def test_parameters_of_all_techniques_stand_once_and_give_way_to_a_techniques_own(write_toml):
+    def parameters(text):
+        study = load_study(write_toml(text))
+        return {one.name: one.parameters for one in study.techniques}
+
+    text = TOML.replace("[[techniques]]", "[parameters]\nradius_mm = 1.0\n\n[[techniques]]", 1)
+    assert parameters(text) == {"plain": {"radius_mm": 1.0}, "soft": {"radius_mm": 2.5}}
 
 
 def test_record_is_read_back(small_study):
