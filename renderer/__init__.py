@@ -1,4 +1,4 @@
-"""Renders one head under one light with every technique; see renderer.frame.Renderer.
+"""Renders one head under one light with every technique; see renderer.renderer.Renderer.
 
 Importing this package does not touch OpenGL: names resolve on first use.
 """
@@ -15,8 +15,8 @@ if sys.platform == "linux":
 
 VERSION = "0.2.0"
 _WHERE = {
-    "Renderer": "renderer.frame",
-    "driver": "renderer.frame",
+    "Renderer": "renderer.renderer",
+    "driver": "renderer.renderer",
     "TECHNIQUES": "renderer.techniques",
     "make": "renderer.techniques",
     "FRAMINGS": "renderer.scene.camera",

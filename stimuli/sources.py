@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SHADERS = ("*.glsl", "*.vert", "*.frag", "*.geom")
 NAMED = re.compile(r"techniques/(\w+)")
 #: Where following starts for every image.
-SHARED = ("renderer.frame", "stimuli.scenes.staging")
+SHARED = ("renderer.renderer", "stimuli.scenes.staging")
 
 
 @lru_cache(maxsize=256)

@@ -178,8 +178,8 @@ def fake_renderer(monkeypatch):
             notes=("a sphere has no face",),
         )
 
-    monkeypatch.setattr("renderer.frame.Renderer", FakeRenderer)
-    monkeypatch.setattr("renderer.frame.driver", lambda: FakeRenderer("", (), 1, 0).info())
+    monkeypatch.setattr("renderer.renderer.Renderer", FakeRenderer)
+    monkeypatch.setattr("renderer.renderer.driver", lambda: FakeRenderer("", (), 1, 0).info())
     monkeypatch.setattr("renderer.techniques.make", make)
     monkeypatch.setattr("stimuli.scenes.stage", stage)
     monkeypatch.setattr("stimuli.build._source", lambda module: "source")

@@ -21,6 +21,7 @@ def test_an_image_hangs_on_its_technique_and_on_what_all_share():
         "renderer/shaders/burley_disc.glsl",
         "renderer/passes/skin.frag",
         "renderer/frame.py",
+        "renderer/renderer.py",
         "renderer/optics/fits.py",
         "stimuli/heads/skin.py",
     } <= plus
