@@ -378,11 +378,13 @@ def _preferences(techniques: list[str], table: pd.DataFrame, codebook: Codebook)
     shares = 100 * table[list(tallies.DISTRIBUTION)].to_numpy() / table.n.to_numpy()[:, None]
     starts = -(shares[:, 0] + shares[:, 1] + shares[:, 2] / 2)
     opponents = {name: _wrapped(codebook.label(name), 15) for name in dict.fromkeys(table.opponent)}
+    titles = {name: _wrapped(codebook.label(name), 18) for name in techniques}
     most = table.groupby("technique").size().max()
+    above_in = 0.42 + 0.13 * max(title.count("\n") for title in titles.values())
     figure, panels = _panels(
         len(techniques),
         3,
-        0.42 + _row_in(list(opponents.values())) * most,
+        above_in + _row_in(list(opponents.values())) * most,
         below_in=0.5,
         sharex=True,
     )
@@ -413,7 +415,7 @@ def _preferences(techniques: list[str], table: pd.DataFrame, codebook: Codebook)
                     )
             left = left + share[:, answer]
         ax.axvline(0, color=INK, linewidth=0.7, zorder=0)
-        ax.set_title(_cut(codebook.label(technique), 26), loc="left", size=8)
+        ax.set_title(titles[technique], loc="left", size=8)
         ax.set_yticks(range(len(about)), [opponents[name] for name in about.opponent])
         ax.set_ylim(len(about) - 0.5, -0.5)
         ax.set_xlim(-100, 100)

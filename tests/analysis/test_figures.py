@@ -1,6 +1,6 @@
 """What is drawn where: lengths, sides and places of bars and dots, read back from the figures."""
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pandas as pd
@@ -110,6 +110,17 @@ def test_a_technique_without_a_value_has_no_bar_and_says_so():
     assert [patch.get_width() for patch in near.patches] == [3, 0]
     assert [patch.get_width() for patch in far.patches] == [1]
     assert "no value" in " ".join(text.get_text() for text in far.texts)
+
+
+def test_titles_of_panels_lie_within_the_figure_and_beside_each_other(write, answer):
+    names = [f"technique_number_{k}_of_many" for k in range(3)]
+    rows = [answer("P1", "close-up", a, b, 1) for a, b in combinations(names, 2)]
+    responses = read_responses(write(rows))
+    figure = _preferences(names, distributions(responses), responses.codebook)
+    figure.draw_without_rendering()
+    titles = [ax._left_title.get_window_extent() for ax in figure.axes]
+    assert all(a.x1 < b.x0 for a, b in pairwise(titles))
+    assert titles[-1].x1 <= figure.bbox.x1
 
 
 def test_long_names_are_wrapped_and_cut():
