@@ -37,7 +37,7 @@ COLUMNS = {
     "side_balance": "framing,technique,left,right,left_share,p,holm_p",
     "participants": "participant,familiarity,answers,left,none,right,side_p,same_answer_share,"
     "median_rt_ms,circular_triads,zeta,"
-    "repeats,repeat_share,agreement_with_others,excluded",
+    "repeats,repeat_share,traps,trap_share,agreement_with_others,excluded",
     "sensitivity": "framing,conclusion,a,b,everyone,without_excluded,changed",
     "familiarity_interaction": "framing,technique,n,slope,low,high,spearman,p,holm_p,detectable",
     "notes": "table,note",

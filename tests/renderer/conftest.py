@@ -79,9 +79,13 @@ def techniques():
 
 @pytest.fixture(scope="session")
 def results(frames, techniques):
-    """framing -> technique -> Result"""
+    """framing -> technique -> Result; what works on surfaces themselves is drawn at close-up."""
     return {
-        f: {t: frame.render(technique) for t, technique in techniques.items()}
+        f: {
+            t: frame.render(technique)
+            for t, technique in techniques.items()
+            if technique.domain == "screen" or f == "close-up"
+        }
         for f, frame in frames.items()
     }
 

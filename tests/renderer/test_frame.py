@@ -206,9 +206,10 @@ def test_command_line_refuses_in_one_line(arguments, words, capsys, tmp_path, mo
     assert not list(tmp_path.iterdir())
 
 
-def test_times_are_taken_of_every_technique(frames, techniques):
-    spent = frames["head-shot"].time(techniques, 2)
-    assert spent.keys() == techniques.keys()
+def test_times_are_taken_of_techniques(frames, techniques):
+    timed = {name: techniques[name] for name in ("none", "golubev_plus", "deon_luebke")}
+    spent = frames["head-shot"].time(timed, 2)
+    assert spent.keys() == timed.keys()
     assert all(
         times.shape == (2, 2) and (times[:, 0] > 0).all() and (times >= 0).all()
         for times in spent.values()
