@@ -19,9 +19,11 @@ SHOWN_ROWS = 20
 
 
 def names(
-    ctx: click.Context, parameter: click.Parameter, value: str | None
+    ctx: click.Context, parameter: click.Parameter, value: str | tuple[str, ...] | None
 ) -> tuple[str, ...] | None:
-    """'a, b,c' as ('a', 'b', 'c')."""
+    """'a, b,c' as ('a', 'b', 'c'); of an option that may be repeated, those of all its values."""
+    if parameter.multiple:
+        value = ",".join(value) if value else None
     return None if value is None else tuple(name.strip() for name in value.split(","))
 
 
@@ -52,11 +54,12 @@ study_option = click.option(
 )
 varied_option = click.option(
     "--varied",
+    multiple=True,
     callback=names,
     metavar="A,B",
     help=(
-        "Columns that tell images apart beside framing, such as person,light. Without it those "
-        "of the study's manifest."
+        "Columns that tell images apart beside framing, such as person,light, or one each time. "
+        "Without it those of the study's manifest."
     ),
 )
 

@@ -2,6 +2,7 @@
 what is refused.
 """
 
+import click
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,6 +12,7 @@ from scipy import stats
 from analysis import InputError, Options, everything, read_responses, responses_from_records
 from analysis.panel import panels
 from analysis.report import report_responses
+from app.answers import varied_option
 from app.commands.analyse import command
 
 HEADER = "participant,familiarity,framing,left,right,answer,order,rt_ms,started_at"
@@ -391,3 +393,15 @@ def test_columns_that_tell_images_apart_keep_every_answer(write, answer):
     assert len(by_person.frame) == 32 and by_person.codebook.framings == ("man", "woman")
     with pytest.raises(InputError, match="has no column 'skin'"):
         read_responses(path, varied=("skin",))
+
+
+@pytest.mark.parametrize("given", [["person,light"], ["person", "light"], []])
+def test_columns_that_tell_images_apart_are_named_at_once_or_one_by_one(given):
+    @click.command()
+    @varied_option
+    def shown(varied):
+        click.echo(varied)
+
+    arguments = [word for value in given for word in ("--varied", value)]
+    output = CliRunner().invoke(shown, arguments).output
+    assert output == ("('person', 'light')\n" if given else "\n")
