@@ -202,16 +202,7 @@ def simulated(stack: Stack, photons: int = PHOTONS, progress: bool = False) -> C
         edges = np.geomspace(finest_mm(stack, c) / 100, reach_mm(stack), RINGS)
         results.append(
             montecarlo.simulate(
-                [
-                    montecarlo.Layer(
-                        n=layer.medium.eta,
-                        mu_a=layer.medium.sigma_a[c],
-                        mu_s=float(layer.medium.sigma_s[c]),
-                        g=float(layer.medium.g),
-                        d=float(layer.thickness_mm),
-                    )
-                    for layer in stack.layers
-                ],
+                montecarlo.layers_of(stack, c),
                 photons,
                 SEED,
                 stack.n_above,

@@ -24,7 +24,7 @@ import numpy as np
 
 from renderer import caches
 from renderer.errors import InputError
-from renderer.optics.medium import reach
+from renderer.optics.medium import Stack, reach
 
 BATCHES = 64
 CHUNK, CHUNK_S = (
@@ -95,6 +95,20 @@ class Layer:
         if not {"mu_a", "mu_s"} <= set(values):
             raise InputError(f"layer {text!r} lacks mu_a or mu_s; expected both, in 1/mm")
         return cls(**values)
+
+
+def layers_of(stack: Stack, channel: int) -> list[Layer]:
+    """A stack's layers as one of its channels meets them, outermost first."""
+    return [
+        Layer(
+            n=layer.medium.eta,
+            mu_a=layer.medium.sigma_a[channel],
+            mu_s=float(layer.medium.sigma_s[channel]),
+            g=float(layer.medium.g),
+            d=float(layer.thickness_mm),
+        )
+        for layer in stack.layers
+    ]
 
 
 @dataclass(frozen=True)

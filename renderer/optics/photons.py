@@ -50,19 +50,9 @@ class MonteCarlo(Profile):
         stack, edges = self.stack, self.edges_mm()
         out = []
         for c in range(stack.channels):
-            layers = [
-                montecarlo.Layer(
-                    n=layer.medium.eta,
-                    mu_a=layer.medium.sigma_a[c],
-                    mu_s=float(layer.medium.sigma_s[c]),
-                    g=float(layer.medium.g),
-                    d=float(layer.thickness_mm),
-                )
-                for layer in stack.layers
-            ]
             out.append(
                 montecarlo.simulate(
-                    layers,
+                    montecarlo.layers_of(stack, c),
                     self.photons,
                     self.seed,
                     stack.n_above,

@@ -130,17 +130,8 @@ def _slabs(stack: Stack, c: int, photons: int) -> tuple[np.ndarray, np.ndarray, 
         d = np.array([far])
     t, error = np.empty(len(d)), np.empty(len(d))
     for k, thickness in enumerate(d):
-        layers = [
-            montecarlo.Layer(
-                n=layer.medium.eta,
-                mu_a=layer.medium.sigma_a[c],
-                mu_s=float(layer.medium.sigma_s[c]),
-                g=float(layer.medium.g),
-                d=float(layer.thickness_mm),
-            )
-            for layer in part(stack, thickness).layers
-        ]
-        indices = (stack.n_above, part(stack, thickness).n_below)
+        whole = part(stack, thickness)
+        layers, indices = montecarlo.layers_of(whole, c), (stack.n_above, whole.n_below)
         found = montecarlo.simulate(
             layers, photons, SEED, *indices, illumination="diffuse", bins=[0.0, 1.0]
         )
