@@ -238,3 +238,18 @@ def test_the_picture_of_the_rooms_is_that_of_the_imports():
         own_top = source.startswith(f"{target}_") or target.startswith(f"{source}_")
         by_a_way = own_top or followed.has_edge(source, target) or target == "renderer"
         assert by_a_way, (source, target)
+
+
+def test_what_git_tracks_at_the_top_is_the_house():
+    """A file that a slip of the shell wrote and a commit took along is found here."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split("\0")
+    folders = {path.split("/")[0] for path in listed if "/" in path}
+    assert folders == {
+        *(".ci", "analysis", "app", "benchmarks", "docs", "examples", "renderer", "stimuli"),
+        *("templates", "tests", "tools"),
+    }
+    files = {path for path in listed if path and "/" not in path}
+    odd = {name for name in files if not all(c.isalnum() or c in "._-" for c in name)}
+    assert not odd, odd
