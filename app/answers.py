@@ -31,16 +31,16 @@ def numbers(
     ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, float]:
     """('a=0.3', 'b=-1') as {'a': 0.3, 'b': -1}."""
-    found = {}
+    values_by_name = {}
     for text in values:
         name, _, number = text.partition("=")
         try:
-            found[name.strip()] = float(number)
+            values_by_name[name.strip()] = float(number)
         except ValueError:
             raise click.BadParameter(
                 f"{text!r} is no {parameter.metavar}, such as golubev=0.4"
             ) from None
-    return found
+    return values_by_name
 
 
 study_option = click.option(

@@ -144,11 +144,11 @@ def _dump(archive: zipfile.ZipFile, connection: Connection, table: Table) -> dic
     rows, digest = 0, hashlib.sha256()
     entry = zipfile.ZipInfo(f"tables/{table.name}.jsonl")
     entry.compress_type = zipfile.ZIP_DEFLATED
-    found = connection.execution_options(yield_per=CHUNK_ROWS).execute(
+    selected = connection.execution_options(yield_per=CHUNK_ROWS).execute(
         select(table).order_by(table.primary_key.columns[0])
     )
     with archive.open(entry, "w", force_zip64=True) as file:
-        for row in found.mappings():
+        for row in selected.mappings():
             line = json.dumps(dict(row), default=datetime.isoformat, ensure_ascii=False) + "\n"
             file.write(line.encode())
             digest.update(line.encode())

@@ -89,9 +89,9 @@ class Database:
                 session.add(StudyRecord(id=1, secret_key=secrets.token_hex(32), **expected))
                 return
             for key, value in expected.items():
-                if (found := getattr(record, key)) != value:
+                if (stored := getattr(record, key)) != value:
                     raise InputError(
-                        f"{shown}: holds answers of another study: {key} is {found!r}, "
+                        f"{shown}: holds answers of another study: {key} is {stored!r}, "
                         f"expected {value!r}"
                     )
             begun = session.scalar(select(Participant.id).limit(1)) is not None

@@ -419,9 +419,9 @@ def columns(study: Study) -> tuple[Column, ...]:
         )
         for factor in study.definition.factors[1:]
     ]
-    asked = study.definition
-    own = [_own(ask, "before") for ask in asked.before] + [
-        _own(ask, "after") for ask in asked.after
+    definition = study.definition
+    own = [_own(ask, "before") for ask in definition.before] + [
+        _own(ask, "after") for ask in definition.after
     ]
     return (*COLUMNS[:place], *further, *COLUMNS[place:], *own)
 
@@ -553,9 +553,9 @@ def table_csv(names: list[str], rows: Iterable[dict[str, Any]]) -> Iterator[str]
 
 def completed_on(session: Session, code: str) -> date | None:
     """The day on which a completion code was given; None where it was not."""
-    asked = select(Participant.completed_at).where(Participant.completion_code == code)
-    found = session.scalar(asked) if code else None
-    return None if found is None else found.date()
+    query = select(Participant.completed_at).where(Participant.completion_code == code)
+    completed_at = session.scalar(query) if code else None
+    return None if completed_at is None else completed_at.date()
 
 
 def completions_csv(session: Session) -> Iterator[str]:
@@ -563,12 +563,12 @@ def completions_csv(session: Session) -> Iterator[str]:
     does not say who gave which answers.
     """
     given = select(Participant).where(Participant.completion_code.is_not(None))
-    found = session.scalars(given.order_by(Participant.completion_code))
+    participants = session.scalars(given.order_by(Participant.completion_code))
     return _csv(
         ("completion_code", "completed_on", "withdrawn"),
         (
             (one.completion_code, one.completed_at.date().isoformat(), int(bool(one.withdrawn_at)))
-            for one in found
+            for one in participants
         ),
     )
 
@@ -578,7 +578,7 @@ def recruits_csv(session: Session, study: Study) -> Iterator[str]:
     the order of the recruiter's names, so that it does not say who gave which answers.
     """
     names = study.definition.recruiting.parameters
-    found = session.scalars(
+    participants = session.scalars(
         select(Participant)
         .where(Participant.recruit_id.is_not(None))
         .order_by(Participant.recruit_id)
@@ -591,7 +591,7 @@ def recruits_csv(session: Session, study: Study) -> Iterator[str]:
             int(one.withdrawn_at is not None),
             int(one.excluded_at is not None),
         )
-        for one in found
+        for one in participants
     )
     header = (*names, "completion_code", "completed", "withdrawn", "excluded")
     return _csv(header, rows)
@@ -607,9 +607,9 @@ def codebook_csv(study: Study) -> Iterator[str]:
 
 def codebook_md(study: Study, *, simulated: bool) -> str:
     """codebook.md: the same for reading, with what the names and numbers stand for."""
-    asked = study.definition
+    definition = study.definition
     lines = [
-        f"# Codebook of {asked.title} ({asked.name}, version {asked.version})",
+        f"# Codebook of {definition.title} ({definition.name}, version {definition.version})",
         "",
         "One row of `responses.csv` is one answer. "
         + (
@@ -622,22 +622,25 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
         "|---|---|---|---|",
         *(f"| `{c.name}` | {c.type} | {c.values} | {c.description} |" for c in columns(study)),
         "",
-        f"Question: {asked.question.text}",
+        f"Question: {definition.question.text}",
         "",
-        *(f"- answer {level.value}: {level.label}" for level in asked.scale),
+        *(f"- answer {level.value}: {level.label}" for level in definition.scale),
         *(
             f"- {factor.name} `{level.name}`: {level.label}"
-            for factor in asked.factors
+            for factor in definition.factors
             for level in factor.levels
         ),
-        *(f"- technique `{condition.name}`: {condition.label}" for condition in asked.techniques),
-        *(f"- reason {place}: {tick}" for place, tick in enumerate(asked.reason.ticks, 1)),
+        *(
+            f"- technique `{condition.name}`: {condition.label}"
+            for condition in definition.techniques
+        ),
+        *(f"- reason {place}: {tick}" for place, tick in enumerate(definition.reason.ticks, 1)),
         "",
-        f"Familiarity: {asked.familiarity.question}",
+        f"Familiarity: {definition.familiarity.question}",
         "",
         *(
             f"- familiarity {value}: {label}"
-            for value, label in zip(asked.familiarity.levels, asked.familiarity.labels)
+            for value, label in zip(definition.familiarity.levels, definition.familiarity.labels)
         ),
     ]
     return "\n".join(lines) + "\n"

@@ -59,18 +59,18 @@ def door(session: Session, record: StudyRecord, *, insider: bool) -> Door:
     return Door.FULL if full and places(session, record) >= record.quota else Door.OPEN
 
 
-def told(study: Study, link: Mapping[str, str]) -> dict[str, str]:
+def link_fields(study: Study, link: Mapping[str, str]) -> dict[str, str]:
     """What a recruiter's link says, of what the study declares; each at most `LONGEST` long."""
     declared = study.definition.recruiting.parameters
     return {name: link[name][:LONGEST] for name in declared if link.get(name)}
 
 
-def known(session: Session, study: Study, said: Mapping[str, str]) -> Door:
+def admission(session: Session, study: Study, fields: Mapping[str, str]) -> Door:
     """Whether the recruiter's link lets somebody in."""
-    asked = study.definition.recruiting
-    if asked.required and asked.parameters[0] not in said:
+    recruiting = study.definition.recruiting
+    if recruiting.required and recruiting.parameters[0] not in fields:
         return Door.STRANGER
-    who = said.get(asked.parameters[0]) if asked.parameters else None
+    who = fields.get(recruiting.parameters[0]) if recruiting.parameters else None
     query = select(Participant.id).where(Participant.recruit_id == who).limit(1)
     return Door.AGAIN if who and session.scalar(query) else Door.OPEN
 

@@ -65,22 +65,22 @@ class Rendition:
         return self.width == width or (steps and max(self.size) <= LARGEST_PX)
 
 
-def rendition(found: Rendition, folder: Path, *, webp: bool) -> tuple[bytes, str]:
+def rendition(rendered: Rendition, folder: Path, *, webp: bool) -> tuple[bytes, str]:
     """The bytes and their media type. webp: whether the browser takes it.
 
     Raises `Changed` where the file is not the one that the study was opened with.
     """
-    image = found.image
+    image = rendered.image
     path = image.path.resolve()
     check(path, image.sha256)
     box = "-".join(map(str, image.box))
-    kept = folder / f"{image.sha256}_{box}_{found.width}.{'webp' if webp else 'png'}"
+    kept = folder / f"{image.sha256}_{box}_{rendered.width}.{'webp' if webp else 'png'}"
     with _locks.setdefault(kept.name, threading.Lock()):
         try:
             data = kept.read_bytes()
             kept.touch()
         except OSError:
-            data = _made(found, path, webp)
+            data = _made(rendered, path, webp)
             _keep(kept, data)
     return data, WEBP if data[8:12] == b"WEBP" else PNG if data[1:4] == b"PNG" else image.media_type
 
@@ -97,11 +97,11 @@ def _digest(path: Path, _mtime_ns: int, _size: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _made(found: Rendition, path: Path, webp: bool) -> bytes:
+def _made(rendered: Rendition, path: Path, webp: bool) -> bytes:
     with PIL.Image.open(path) as picture:
         picture.load()
         plain = picture.mode in ("RGB", "RGBA", "L") and not picture.info.keys() & _CHANGE_PIXELS
-        whole = found.natural == picture.size and found.width == picture.width
+        whole = rendered.natural == picture.size and rendered.width == picture.width
         if whole and (not plain or not webp):
             return path.read_bytes()  # nothing is gained, or something would be lost
         profile = picture.info.get("icc_profile")
@@ -110,9 +110,9 @@ def _made(found: Rendition, path: Path, webp: bool) -> bytes:
         if picture.mode not in ("RGB", "RGBA", "L"):
             picture = picture.convert("RGBA" if "transparency" in picture.info else "RGB")
         if not whole:
-            picture = picture.crop(found.image.box)
-        if picture.size != found.size:
-            picture = resampled(picture, found.size)
+            picture = picture.crop(rendered.image.box)
+        if picture.size != rendered.size:
+            picture = resampled(picture, rendered.size)
         out = io.BytesIO()
         more = {"icc_profile": profile} if profile else {}
         picture.save(out, **(_WEBP if webp else {"format": "PNG"}), **more)

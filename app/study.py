@@ -123,14 +123,14 @@ class Study:
     @property
     def _recorded(self) -> str:
         """What is stored of a participant, with what this study asks beside the pairs."""
-        asked, parts = self.definition, list(RECORDED)
-        if own := len(asked.before) + len(asked.after):
+        definition, parts = self.definition, list(RECORDED)
+        if own := len(definition.before) + len(definition.after):
             parts.append(f"your answers to {own} other question{'s' if own > 1 else ''}")
-        if asked.screen.check:
+        if definition.screen.check:
             parts.append("the size of your screen's pixels, its greys and the zoom")
-        if asked.reason.share:
+        if definition.reason.share:
             parts.append("the reasons that you give for a choice")
-        if names := ", ".join(asked.recruiting.parameters):
+        if names := ", ".join(definition.recruiting.parameters):
             parts.append(f"what your recruiter's link says of you ({names})")
         return f"{'; '.join(parts[:-1])}; and {parts[-1]}"
 

@@ -79,15 +79,15 @@ def image(sha256: str) -> Response:
     """An image of the study by the hash of its bytes; other bytes are never sent under that
     address.
     """
-    found = study().images_by_sha256.get(sha256)
-    if found is None:
+    image_file = study().images_by_sha256.get(sha256)
+    if image_file is None:
         abort(404, "This study has no such image.")
-    path = found.path.resolve()
+    path = image_file.path.resolve()
     try:
         renditions.check(path, sha256)
     except renditions.Changed as error:
         _gone(error)
-    response = send_file(path, mimetype=found.media_type, etag=sha256)
+    response = send_file(path, mimetype=image_file.media_type, etag=sha256)
     response.headers["Cache-Control"] = IMMUTABLE
     return response
 
@@ -97,8 +97,8 @@ def shown(sha256: str, box: str, width: int) -> Response:
     """The region of interest of an image, `width` pixels wide: what a question shows. Its address
     names the bytes of the image, the region and the size, so that it never changes either.
     """
-    found = study().shown.get((sha256, box))
-    wanted = found and renditions.Rendition(found, width)
+    region = study().shown.get((sha256, box))
+    wanted = region and renditions.Rendition(region, width)
     if wanted is None or not wanted.offered:
         abort(404, "This study shows no such image.")
     # named, not by */*: every browser says the latter

@@ -71,19 +71,19 @@ def concluded(path: Path, options: Options, goal: str) -> tuple[list[bool], bool
     )
     reached = decided(results.tables["pairs"], goal)
     if goal == "find":
-        said = [
+        stated = [
             any(
                 f"{name}: simulated participants preferred" in one and PAIR[1] in one.split(" (")[0]
                 for one in words.can
             )
             for name in FRAMINGS
         ]
-        return reached, all(there for here, there in zip(reached, said, strict=True) if here)
-    said = [
+        return reached, all(there for here, there in zip(reached, stated, strict=True) if here)
+    stated = [
         any(one.startswith(f"{name}: {PAIR[0]} and {PAIR[1]} are as good") for one in words.can)
         for name in FRAMINGS
     ]
-    return reached, reached == said
+    return reached, reached == stated
 
 
 def main() -> int:

@@ -151,8 +151,8 @@ class Connection:
         head = (await reader.readuntil(b"\r\n\r\n")).decode()
         length = int(re.search(r"content-length: (\d+)", head, re.I)[1])
         answer = (await reader.readexactly(length)).decode()
-        if found := re.search(r"set-cookie: ([^;]+)", head, re.I):
-            self.cookie = found[1]
+        if cookie := re.search(r"set-cookie: ([^;]+)", head, re.I):
+            self.cookie = cookie[1]
         if re.search(r"connection: close", head, re.I):
             self.close()
         return int(head.split()[1]), answer
@@ -165,8 +165,8 @@ class Connection:
 
 def fields(page: str) -> dict[str, str]:
     """The form of a question, with an answer."""
-    found = re.findall(r'name="(csrf_token|trial|image_left|image_right)" value="([^"]+)"', page)
-    return dict(found) | {"answer": "1", "rt_ms": "4321"}
+    inputs = re.findall(r'name="(csrf_token|trial|image_left|image_right)" value="([^"]+)"', page)
+    return dict(inputs) | {"answer": "1", "rt_ms": "4321"}
 
 
 async def begun(port: int) -> tuple[Connection, dict[str, str]]:
@@ -197,9 +197,9 @@ async def timed(job: Awaitable, times: list[float]):
 
 
 async def answer(person: Connection, form: dict[str, str], times: list[float]) -> None:
-    status, said = await timed(person.ask("/question", form, **JSON), times)
-    if status != 200 or '"recorded"' not in said:
-        raise RuntimeError(f"an answer was not taken: {status} {said[:200]}")
+    status, body = await timed(person.ask("/question", form, **JSON), times)
+    if status != 200 or '"recorded"' not in body:
+        raise RuntimeError(f"an answer was not taken: {status} {body[:200]}")
 
 
 async def insert(person: Connection, times: list[float]) -> None:
@@ -363,8 +363,8 @@ def main() -> None:
         workers = "--workers", str(options.workers)
         ours = ("-m", "app.cli", "serve", str(study), "--port", "0", "--database", url, *workers)
         ours += ("--enrolments", "0")
-        with served(__file__, "--bare", other, *workers) as bare, served(*ours) as asked:
-            asyncio.run(measure(options, study, url, bare, asked))
+        with served(__file__, "--bare", other, *workers) as bare, served(*ours) as studied:
+            asyncio.run(measure(options, study, url, bare, studied))
 
 
 if __name__ == "__main__":

@@ -166,13 +166,13 @@ def growth() -> None:
     cases += [("resamples", count, 1000, 5, count) for count in (100, 1000, 10_000)]
     for what, value, number, n, resamples in cases:
         panel, options = people(number, np.linspace(-0.8, 0.8, n), 1), Options(resamples=resamples)
-        found = [
+        spent = [
             seconds(
                 lambda model=model, panel=panel, options=options: resampled(panel, model, options)
             )[0]
             for model in ("bradley_terry", "thurstone_jod", "davidson")
         ]
-        print(f"  {value:6} {what:10} " + " ".join(f"{one:8.3f}" for one in found))
+        print(f"  {value:6} {what:10} " + " ".join(f"{one:8.3f}" for one in spent))
 
 
 # --- a whole study

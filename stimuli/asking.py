@@ -160,7 +160,7 @@ class Reason:
     ticks: tuple[str, ...] = ()
     free: bool = True
 
-    def asked(self, seed: str, order: int) -> bool:
+    def applies(self, seed: str, order: int) -> bool:
         """Whether the question at a place of a participant's order (`seed` names both) asks it."""
         drawn = int.from_bytes(hashlib.sha256(f"reason/{seed}/{order}".encode()).digest()[:8])
         return drawn < self.share * 2**64

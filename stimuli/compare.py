@@ -91,10 +91,10 @@ def chosen(specifications: Sequence[str]) -> dict[str, Any]:
     """Techniques by "all" or NAME:KEY=VALUE:..., values in JSON or as text; else InputError."""
     import renderer
 
-    found: dict[str, Any] = {}
+    techniques: dict[str, Any] = {}
     for text in specifications:
         if text == "all":
-            found |= {n: renderer.make(n) for n in renderer.TECHNIQUES if n != "reference"}
+            techniques |= {n: renderer.make(n) for n in renderer.TECHNIQUES if n != "reference"}
             continue
         name, *settings = text.split(":")
         parameters = {}
@@ -109,8 +109,8 @@ def chosen(specifications: Sequence[str]) -> dict[str, Any]:
         if name == "reference":
             raise InputError("reference is what techniques are compared to; expected another one")
         label = " ".join([name, *settings])
-        found[label] = renderer.make(name, parameters)
-    return found
+        techniques[label] = renderer.make(name, parameters)
+    return techniques
 
 
 def compare(
@@ -181,9 +181,9 @@ def _shot(framing, frame, lights, techniques, options: Options, distances: Dista
         for region, mask in masks.items():
             rmse, error = rms_error(light[mask] / unit, means[:, mask] / unit)
             ratio = light[mask].mean(axis=0) / means.mean(axis=0)[mask].mean(axis=0)
-            found = {k: tuple(float(m[mask].mean()) for m in both) for k, both in maps.items()}
+            measures = {k: tuple(float(m[mask].mean()) for m in both) for k, both in maps.items()}
             numbers = [tuple(map(float, part)) for part in (rmse, error, ratio)]
-            rows.append(Row(framing, name, region, int(mask.sum()), *numbers, found))
+            rows.append(Row(framing, name, region, int(mask.sum()), *numbers, measures))
     noise = np.sqrt(((halves[0] - halves[1])[scatters] ** 2).mean(axis=0)) / 2 / unit
     return Shot(framing, images, half, tuple(rows), noise, residual)
 

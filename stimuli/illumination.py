@@ -367,7 +367,7 @@ def cube(rays: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     }
     world = World(stage(read_scene(table)).graph, seed)
     walls = radiosity.patches(world, 150.0)
-    return radiosity.exchange(world, walls, rays, seed).found, walls.normals @ walls.normals.T
+    return radiosity.exchange(world, walls, rays, seed).counted, walls.normals @ walls.normals.T
 
 
 def numbers(options: Options, progress: Callable | None = None) -> dict[str, float]:
@@ -387,22 +387,22 @@ def numbers(options: Options, progress: Callable | None = None) -> dict[str, flo
     even = np.full((len(made.area), 3), 1.0)
     closed = made.F / np.maximum(made.F.sum(axis=1, keepdims=True), 1e-30)
     *_, B = radiosity.gauss_seidel(closed, 0.5 * even, even)
-    found, error = paths.picture(
+    radiance, error = paths.picture(
         room.world, room.view, room.size, options.samples, options.seed, progress
     )
     noise = (error**2).mean()
 
     def away(image: np.ndarray) -> float:
         """Root mean square difference to Monte Carlo, without its noise, as a share of the mean."""
-        square = ((image - found) ** 2).mean() - noise
-        return float(np.sign(square) * np.sqrt(abs(square)) / found.mean())
+        square = ((image - radiance) ** 2).mean() - noise
+        return float(np.sign(square) * np.sqrt(abs(square)) / radiance.mean())
 
     return {
         "patches": len(made.area),
         "sweeps": len(solution.sweeps) - 1,
         "row sum, least": float(rows.min()),
         "row sum, most": float(rows.max()),
-        "A_i F_ij unlike A_j F_ji, by rays": lopsided(made.found),
+        "A_i F_ij unlike A_j F_ji, by rays": lopsided(made.counted),
         "A_i F_ij unlike A_j F_ji, balanced": lopsided(made.F),
         "cube, opposite walls": float(walls[cosines < -0.5].mean()),
         "cube, opposite walls, exact": CUBE[0],
@@ -410,8 +410,8 @@ def numbers(options: Options, progress: Callable | None = None) -> dict[str, flo
         "cube, walls side by side, exact": CUBE[1],
         "closed room, E 1, rho .5: B / 2 - 1, most": float(np.abs(B[seen] / 2 - 1).max()),
         "light that goes / that comes - 1": float((goes.sum() / comes.sum()) - 1),
-        "mean radiance, Monte Carlo": float(found.mean()),
-        "its noise, rms": float(np.sqrt(noise) / found.mean()),
+        "mean radiance, Monte Carlo": float(radiance.mean()),
+        "its noise, rms": float(np.sqrt(noise) / radiance.mean()),
         "radiosity, rms from Monte Carlo": away(room.patched()),
         "radiosity + ray tracing, rms from Monte Carlo": away(room.two_pass()),
         "ray casting, rms from Monte Carlo": away(room.traced(0)),
@@ -465,17 +465,17 @@ def gallery(
         tree(options, folder / "tree.png")
         bar.update()
         bar.set_description("numbers")
-        found = numbers(options, say)
+        measured = numbers(options, say)
         bar.update()
     settings = {"version": renderer.VERSION, **options.__dict__}
-    text = json.dumps({"settings": settings, "numbers": found}, indent=1)
+    text = json.dumps({"settings": settings, "numbers": measured}, indent=1)
     (folder / "numbers.json").write_text(text + "\n")
     width = 6 * (options.size_px + GAP_PX) + GAP_PX
     with Image.open(folder / "tree.png") as drawing:
         rows["Whitted's tree of one pixel"] = [("", drawing.convert("RGB"))]
     board = sheet(rows, width)
     board.save(folder / "gallery.png")
-    return folder / "gallery.png", found
+    return folder / "gallery.png", measured
 
 
 def _kept(path: Path, settings: dict[str, Any], draw: Callable[[], np.ndarray]) -> Image.Image:

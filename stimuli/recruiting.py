@@ -70,16 +70,16 @@ def read_recruiting(table: Table) -> Recruiting:
         return not value or (where.scheme == "https" and bool(where.netloc) and named <= known)
 
     expected = f"an https address, with no other than {', '.join(sorted(known))} in braces"
-    found = Recruiting(
+    recruiting = Recruiting(
         panel=panel,
         parameters=tuple(listed),
         required=table.take("required", bool, "true or false", default=False),
         completed=table.take("completed", str, expected, address, default=""),
         turned_away=table.take("turned_away", str, expected, address, default=""),
     )
-    if "{code}" in found.turned_away:
-        raise table.fault("turned_away", found.turned_away, "no {code}: there is none yet")
-    if found.required and not listed:
+    if "{code}" in recruiting.turned_away:
+        raise table.fault("turned_away", recruiting.turned_away, "no {code}: there is none yet")
+    if recruiting.required and not listed:
         raise table.fault("required", True, "parameters that can be required")
     table.end()
-    return found
+    return recruiting

@@ -137,10 +137,10 @@ def command(
             raise click.UsageError(
                 f"{', '.join(unused)} cannot go with --matrices, which has its own names and order"
             )
-        found = read_matrices(matrices)
-        files = report_matrices(found, matrices.name, written())
+        judgements = read_matrices(matrices)
+        files = report_matrices(judgements, matrices.name, written())
         write_files(files, out)
-        click.echo(f"{out / 'report.html'}: priorities of {len(found)} matrices")
+        click.echo(f"{out / 'report.html'}: priorities of {len(judgements)} matrices")
         return
 
     answers, manifest, study = read_answers(responses, study, order, factor, varied)

@@ -49,10 +49,10 @@ def command(clear: str | None) -> None:
 
     A build's images and a study's answers are no caches: they lie where you put them.
     """
-    found = caches()
-    folders = tuple(folder for folder, _ in found.values())
+    all_caches = caches()
+    folders = tuple(folder for folder, _ in all_caches.values())
     if clear:
-        folder, _ = found[clear]
+        folder, _ = all_caches[clear]
         inner = tuple(other for other in folders if other != folder)
         before = size_of(folder, inner)
         for path in sorted(folder.iterdir()) if folder.is_dir() else ():
@@ -60,6 +60,6 @@ def command(clear: str | None) -> None:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
         click.echo(f"{clear}: {before / 2**20:.1f} MB removed from {folder}")
         return
-    for name, (folder, words) in found.items():
+    for name, (folder, words) in all_caches.items():
         click.echo(f"{name:<11}{size_of(folder, folders) / 2**20:>9.1f} MB  {folder}")
         click.echo(f"{'':<11}{words}")

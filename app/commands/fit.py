@@ -108,17 +108,17 @@ def command(kind, model, skin, terms, free, method, k, taps, reach, out, **mediu
     for c, channel in enumerate(CHANNELS):
         if kind == "gaussians":
             r = radius(c)
-            found = gaussians.fit(r, of_channel(c)(r), terms, None if free else float(total[c]))
-            found_report = {
-                "variance_mm2": found.variance_mm2.tolist(),
-                "weights": found.weights.tolist(),
-                "error": found.error,
+            fitted = gaussians.fit(r, of_channel(c)(r), terms, None if free else float(total[c]))
+            channel_report = {
+                "variance_mm2": fitted.variance_mm2.tolist(),
+                "weights": fitted.weights.tolist(),
+                "error": fitted.error,
             }
             lines.append(
-                f"{channel}: E = {100 * found.error:.3f} %, weights sum to "
-                f"{found.weights.sum():.5f}"
+                f"{channel}: E = {100 * fitted.error:.3f} %, weights sum to "
+                f"{fitted.weights.sum():.5f}"
             )
-            for v, w in zip(found.variance_mm2, found.weights, strict=True):
+            for v, w in zip(fitted.variance_mm2, fitted.weights, strict=True):
                 lines.append(f"   v {v:.6g} mm^2  w {w:.6g}")
         else:
             half = reach or far
@@ -134,7 +134,7 @@ def command(kind, model, skin, terms, free, method, k, taps, reach, out, **mediu
                 )
             offsets = separable.tap_offsets(taps, half)
             weights = kernel.taps(offsets)
-            found_report = {
+            channel_report = {
                 "method": kernel.method,
                 "offsets_mm": offsets.tolist(),
                 "weights": weights.tolist(),
@@ -149,7 +149,7 @@ def command(kind, model, skin, terms, free, method, k, taps, reach, out, **mediu
             )
             for offset, weight in zip(offsets[taps // 2 :], weights[taps // 2 :], strict=True):
                 lines.append(f"   x {offset:8.4f} mm  w {weight:.6g}")
-        report["channels"][channel] = found_report
+        report["channels"][channel] = channel_report
     click.echo("\n".join(lines))
     if out:
         out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")

@@ -25,14 +25,14 @@ def command(file: Path, turn_deg: float, as_json: bool) -> None:
     from renderer.scene import harmonics
     from renderer.scene.maps import read_map
 
-    found = harmonics.turned(harmonics.project(read_map(file)), turn_deg)
+    coefficients = harmonics.turned(harmonics.project(read_map(file)), turn_deg)
     if as_json:
-        rows = dict(zip(harmonics.NAMES, found.tolist(), strict=True))
+        rows = dict(zip(harmonics.NAMES, coefficients.tolist(), strict=True))
         click.echo(json.dumps({"file": str(file), "turn_deg": turn_deg, "coefficients": rows}))
         return
     click.echo(f"{'':<6}{'red':>11}{'green':>11}{'blue':>11}")
-    for name, row in zip(harmonics.NAMES, found, strict=True):
+    for name, row in zip(harmonics.NAMES, coefficients, strict=True):
         click.echo(f"{name:<6}" + "".join(f"{value:>11.5f}" for value in row))
-    up, front = harmonics.irradiance(found, [[0, 1, 0], [0, 0, 1]])
+    up, front = harmonics.irradiance(coefficients, [[0, 1, 0], [0, 0, 1]])
     for words, value in (("irradiance from above", up), ("irradiance from the front", front)):
         click.echo(f"{words}: {value[0]:.4f} / {value[1]:.4f} / {value[2]:.4f}")

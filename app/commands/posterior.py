@@ -85,11 +85,11 @@ def command(
     # all draws are one compiled call, in which Python sees no interrupt: the system's end holds
     handler = signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
-        found = sample(answers, options, progress=sys.stderr.isatty())
+        draws = sample(answers, options, progress=sys.stderr.isatty())
     finally:
         signal.signal(signal.SIGINT, handler)
     files, sentences = posterior_files(
-        found, answers, written(), declarations.fingerprint(declared)
+        draws, answers, written(), declarations.fingerprint(declared)
     )
     write_files(files, out)
     tell(responses, answers)

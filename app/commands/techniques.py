@@ -28,14 +28,14 @@ def command(names: tuple[str, ...], medium: str, as_json: bool) -> None:
     for name in names:
         renderer.make(name)
     curve = media.curve(medium)
-    found = {
+    descriptions = {
         name: _described(renderer.make(name), curve, medium)
         for name in names or renderer.TECHNIQUES
     }
     if as_json:
-        click.echo(json.dumps(found, indent=2))
+        click.echo(json.dumps(descriptions, indent=2))
         return
-    for name, entry in found.items():
+    for name, entry in descriptions.items():
         error = " / ".join(f"{v:.4f}" for v in entry["fit_error"])
         click.echo(f"{name}: {entry['title']}")
         click.echo(f"    {entry['paper']}")

@@ -196,10 +196,10 @@ def judge(code: str):
 
 def _someone(db: Session, code: str) -> Participant:
     number = code.removeprefix("P")
-    found = db.get(Participant, int(number)) if re.fullmatch(r"[0-9]{4,9}", number) else None
-    if found is None or found.code != code:
+    someone = db.get(Participant, int(number)) if re.fullmatch(r"[0-9]{4,9}", number) else None
+    if someone is None or someone.code != code:
         abort(404, "There is no such participant.")
-    return found
+    return someone
 
 
 @blueprint.post("/state")
@@ -264,11 +264,11 @@ def completion():
     """Whether a code that somebody shows was given here."""
     code = plain_code(request.form.get("code", ""))
     with database().read() as db:
-        found = export.completed_on(db, code)
-    if found is None:
+        completed_on = export.completed_on(db, code)
+    if completed_on is None:
         flash(f"{code or 'No code'}: not given by this study.")
     else:
-        flash(f"{code}: completed on {found:%Y-%m-%d}.")
+        flash(f"{code}: completed on {completed_on:%Y-%m-%d}.")
     return redirect(url_for(".index"), 303)
 
 
@@ -290,16 +290,16 @@ def report(name: str = "report.html"):
     """The report of `subdermal analyse` and what it links to, with a policy of its own: inline
     styles, no scripts.
     """
-    found = study().report(simulated())
-    if not found.is_file():
+    page = study().report(simulated())
+    if not page.is_file():
         abort(
             404,
             (
                 "There is no report yet. Download responses.csv, then: subdermal analyse "
-                f"responses.csv --out {found.parent.name}"
+                f"responses.csv --out {page.parent.name}"
             ),
         )
-    response = send_from_directory(found.parent, name)
+    response = send_from_directory(page.parent, name)
     response.headers["Content-Security-Policy"] = REPORT_POLICY
     response.headers["Cache-Control"] = "no-store"
     return response

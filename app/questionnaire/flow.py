@@ -102,25 +102,25 @@ def enrol(
     visit: str,
     *,
     insider: bool = False,
-    said: Mapping[str, str] = EMPTY,
+    link_fields: Mapping[str, str] = EMPTY,
 ) -> Participant | Door:
     """The participant of a visit, with the trials assigned; consent given twice is one
     participant. The door where nobody can begin now.
 
-    said: what the recruiter's link said (`recruiting.told`).
+    link_fields: what the recruiter's link said (`recruiting.link_fields`).
     """
     record = recruiting.record_of(session, lock=True)  # before looking: two clicks are one person
     if participant := find(session, visit):
         return participant
     if (door := recruiting.door(session, record, insider=insider)) is not Door.OPEN:
         return door
-    if (door := recruiting.known(session, study, said)) is not Door.OPEN:
+    if (door := recruiting.admission(session, study, link_fields)) is not Door.OPEN:
         return door
     pilot = record.state in ("draft", "pilot")
     participant = Participant(visit=visit, resume_code=_secret(), pilot=pilot)
-    if said:
-        participant.recruit = json.dumps(dict(said))
-        participant.recruit_id = said.get(study.definition.recruiting.parameters[0])
+    if link_fields:
+        participant.recruit = json.dumps(dict(link_fields))
+        participant.recruit_id = link_fields.get(study.definition.recruiting.parameters[0])
     session.add(participant)
     session.flush()  # gives the number
     session.add_all(assign(study, participant))

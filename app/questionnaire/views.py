@@ -73,11 +73,11 @@ def welcome():
                     return render_template("questionnaire/simulated.html")
                 session["visit"] = secrets.token_urlsafe(16)
                 session.permanent = True
-            if said := recruiting.told(study(), request.args):
-                session["recruit"] = said
+            if link_fields := recruiting.link_fields(study(), request.args):
+                session["recruit"] = link_fields
             door = recruiting.door(db, recruiting.record_of(db), insider=password.logged_in())
             if door is Door.OPEN:
-                door = recruiting.known(db, study(), session.get("recruit", {}))
+                door = recruiting.admission(db, study(), session.get("recruit", {}))
             if door is not Door.OPEN:
                 return _closed(door)
             return render_template(
@@ -113,7 +113,7 @@ def consent():
     insider = password.logged_in()
     with database().write() as db:
         participant = flow.enrol(
-            db, study(), session["visit"], insider=insider, said=session.get("recruit", {})
+            db, study(), session["visit"], insider=insider, link_fields=session.get("recruit", {})
         )
         if isinstance(participant, Door):
             return _closed(participant)
@@ -129,9 +129,9 @@ def _closed(door: Door):
 
 def _back(participant: Participant) -> str:
     """Where the recruiter wants who has finished to go; '' for nowhere."""
-    asked = study().definition.recruiting
-    said = json.loads(participant.recruit or "{}")
-    return asked.back(asked.completed, said | {"code": participant.completion_code})
+    recruiter = study().definition.recruiting
+    link_fields = json.loads(participant.recruit or "{}")
+    return recruiter.back(recruiter.completed, link_fields | {"code": participant.completion_code})
 
 
 @blueprint.get("/closed")
@@ -306,13 +306,13 @@ def answer():
         abort(400, "This study shows images by JavaScript, which is switched off or was kept away.")
     shown = flow.Shown.of_cookie(session.get("shown"))
     visit, bound = session.get("visit", ""), not simulated()
-    said = flow.answer(database(), study(), visit, trial, given, shown, bound=bound)
-    if said is None:
+    result = flow.answer(database(), study(), visit, trial, given, shown, bound=bound)
+    if result is None:
         message = "This browser has not begun the questionnaire, or lost its cookies."
         if wants_json():
             return jsonify(error=message, lost=True), 400
         abort(400, message)
-    outcome, here = said
+    outcome, here = result
     if here.answered == here.questions:
         # the answers are on the disk: now the committed ones can be counted
         with database().write() as db:
@@ -477,7 +477,7 @@ def _ticks() -> str | None:
 
 
 def _asks_reason(participant: Participant, order: int) -> bool:
-    return study().definition.reason.asked(f"{study().seed}/{participant.id}", order)
+    return study().definition.reason.applies(f"{study().seed}/{participant.id}", order)
 
 
 def _pauses(answered: int) -> bool:

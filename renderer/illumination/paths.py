@@ -121,10 +121,10 @@ def picture(
     for k in range(samples):
         rng = np.random.default_rng([seed, 5, k])
         shift = rng.random((width * height, 2))
-        found = trace(world, *camera_rays(view, width, height, shift), rng)
-        step = found - mean
+        radiance = trace(world, *camera_rays(view, width, height, shift), rng)
+        step = radiance - mean
         mean += step / (k + 1)
-        spread += step * (found - mean)
+        spread += step * (radiance - mean)
         if progress:
             progress(k + 1)
     error = np.sqrt(spread / (samples - 1) / samples)

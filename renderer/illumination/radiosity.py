@@ -84,7 +84,7 @@ class Exchange:
 
     F (P, P): the share of the light that leaves i and arrives at j; area (P,): mm^2, without what
     lies inside of another body; open (P,): the share that leaves the scene; from_lamps,
-    from_around (P, 3): irradiance from lamps and environment. found: F before it was balanced.
+    from_around (P, 3): irradiance from lamps and environment. counted: F before it was balanced.
     """
 
     F: np.ndarray
@@ -92,7 +92,7 @@ class Exchange:
     open: np.ndarray
     from_lamps: np.ndarray
     from_around: np.ndarray
-    found: np.ndarray
+    counted: np.ndarray
 
 
 def exchange(world: World, made: Patches, rays: int, seed: int) -> Exchange:
@@ -137,22 +137,22 @@ def exchange(world: World, made: Patches, rays: int, seed: int) -> Exchange:
             for k in range(3):
                 lamps[:, k] += np.bincount(own[seen], arrives[:, k], count)
     rays_left = np.maximum(known, 1)[:, None]
-    found = hits / rays_left
+    counted = hits / rays_left
     area = made.area * known / rays
-    F = balanced(found, area)
+    F = balanced(counted, area)
     return Exchange(
-        F, area, lost / rays_left[:, 0], lamps / rays_left, np.pi * around / rays_left, found
+        F, area, lost / rays_left[:, 0], lamps / rays_left, np.pi * around / rays_left, counted
     )
 
 
-def balanced(found: np.ndarray, area: np.ndarray, tolerance: float = 1e-9) -> np.ndarray:
-    """Form factors that are reciprocal, A_i F_ij = A_j F_ji, with the row sums of `found`.
+def balanced(counted: np.ndarray, area: np.ndarray, tolerance: float = 1e-9) -> np.ndarray:
+    """Form factors that are reciprocal, A_i F_ij = A_j F_ji, with the row sums of `counted`.
 
     The mean of both directions is scaled by d_i d_j (a symmetric Sinkhorn iteration) until the rows
     sum to what they did: rays alone keep the sums, and reciprocity within their noise. Where rays
     are so few that no scaling does it, what a row lacks stays with its patch.
     """
-    exchanged = area[:, None] * found
+    exchanged = area[:, None] * counted
     wanted = exchanged.sum(axis=1)
     S = 0.5 * (exchanged + exchanged.T)
     rows = wanted > 0

@@ -43,8 +43,8 @@ class World:
     """Surfaces and eyes of a graph, without hair, for rays on the CPU; seed: of soft shadows."""
 
     def __init__(self, graph: pyrender.Scene, seed: int = 0):
-        found = contents(graph)
-        items = [*found.surfaces, *found.eyes]
+        parts = contents(graph)
+        items = [*parts.surfaces, *parts.eyes]
         if not items:
             raise InputError("the scene has no surface; expected at least one mesh")
         bodies = [body(item) for item in items]
@@ -59,11 +59,11 @@ class World:
         self.own = np.vstack(own)  # positions along each object's own axes, mm
         self.body = np.repeat(np.arange(len(bodies)), [len(b.faces) for b in bodies])
         eye = Shading(model="lambert", albedo=(0.5, 0.5, 0.5))
-        materials = [item.primitive.material.value for item in found.surfaces]
-        self.coefficients = Coefficients.of([*materials, *[eye] * len(found.eyes)])
-        self.surroundings = Surroundings(found.environment)
+        materials = [item.primitive.material.value for item in parts.surfaces]
+        self.coefficients = Coefficients.of([*materials, *[eye] * len(parts.eyes)])
+        self.surroundings = Surroundings(parts.environment)
         self.mean_radiance = self.surroundings.mean()
-        self.tracer = Tracer(self.positions, self.faces, found.lights, self.environment, seed)
+        self.tracer = Tracer(self.positions, self.faces, parts.lights, self.environment, seed)
         self.flat = np.asarray(self.tracer.mesh.face_normals, float)
         self.areas = np.asarray(self.tracer.mesh.area_faces, float)
 

@@ -69,9 +69,9 @@ class Transmittance:
 
     def table(self) -> np.ndarray:
         """T at reach_mm (k / (TABLE - 1))^2, for a texture: (TABLE, C), its last row 0."""
-        found = self.at(self.reach_mm * (np.arange(TABLE) / (TABLE - 1)) ** 2)
-        found[-1] = 0
-        return found
+        values = self.at(self.reach_mm * (np.arange(TABLE) / (TABLE - 1)) ** 2)
+        values[-1] = 0
+        return values
 
 
 def part(stack: Stack, thickness_mm: float) -> Stack:
@@ -132,11 +132,11 @@ def _slabs(stack: Stack, c: int, photons: int) -> tuple[np.ndarray, np.ndarray, 
     for k, thickness in enumerate(d):
         whole = part(stack, thickness)
         layers, indices = montecarlo.layers_of(whole, c), (stack.n_above, whole.n_below)
-        found = montecarlo.simulate(
+        run = montecarlo.simulate(
             layers, photons, SEED, *indices, illumination="diffuse", bins=[0.0, 1.0]
         )
-        entered = 1 - found.specular
-        t[k], error[k] = found.transmittance / entered, found.transmittance_error / entered
+        entered = 1 - run.specular
+        t[k], error[k] = run.transmittance / entered, run.transmittance_error / entered
     if not math.isinf(stack.thickness_mm):  # the sheet lets as much through wherever it is
         return np.array([0.0, 1e4]), np.repeat(t, 2), np.repeat(error, 2)
     seen = t > LEAST * 0.1  # below, a few photons say nothing
@@ -149,9 +149,9 @@ def homogeneous(value: str | Mapping[str, Any]) -> Medium:
     """One medium for what a scene names: itself, or of layers and formulas the one whose curve is
     nearest (renderer.optics.media.invert).
     """
-    found = media.read(value)
-    if isinstance(found, Stack) and len(found.layers) == 1:
-        return found.layers[0].medium
+    stack = media.read(value)
+    if isinstance(stack, Stack) and len(stack.layers) == 1:
+        return stack.layers[0].medium
     return media.invert(media.curve(value)).medium
 
 

@@ -194,11 +194,11 @@ class Surfaces:
         key = (drawn.id, translucency.model, translucency.exponent)
         if key not in self._transmittances:
             medium = self.media[drawn.id - 1]
-            found = curve_of(medium, translucency.model, translucency.exponent)
+            curve = curve_of(medium, translucency.model, translucency.exponent)
             table = np.ones((1, TABLE, 4), np.float32)
-            table[0, :, :3] = found.table()
+            table[0, :, :3] = curve.table()
             texture = gl.Texture(TABLE, 1, GL.GL_RGBA32F, linear=True, data=table)
-            self._transmittances[key] = (texture, found.reach_mm)
+            self._transmittances[key] = (texture, curve.reach_mm)
         texture, reach_mm = self._transmittances[key]
         return {
             "transmittance": texture,

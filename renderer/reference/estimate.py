@@ -49,10 +49,10 @@ def walked(description: str | dict) -> Walked:
 
 @lru_cache(maxsize=32)
 def _walked(description: str) -> Walked:
-    found, target = (read(json.loads(description)) for read in (media.read, media.curve))
-    deep = isinstance(found, Stack) and len(found.layers) == 1 and np.isinf(found.thickness_mm)
-    if deep and found.n_above == 1:
-        medium, residual = found.layers[0].medium, np.zeros(found.channels)
+    stack, target = (read(json.loads(description)) for read in (media.read, media.curve))
+    deep = isinstance(stack, Stack) and len(stack.layers) == 1 and np.isinf(stack.thickness_mm)
+    if deep and stack.n_above == 1:
+        medium, residual = stack.layers[0].medium, np.zeros(stack.channels)
     else:
         inversion = media.invert(target)
         medium, residual = inversion.medium, inversion.residual
@@ -181,15 +181,15 @@ def _add(
         which = np.arange(start, min(start + BLOCK, total))
         place, number = which // len(numbers), numbers[which % len(numbers)]
         names = index[place].astype(np.uint64) * np.uint64(65536) + number.astype(np.uint64)
-        found = [
+        walks = [
             walk(solid, medium, c, points[place], normals[place], names, [seed]) for c in channels
         ]
-        triangles = np.concatenate([w.triangle for w in found])
+        triangles = np.concatenate([w.triangle for w in walks])
         if not len(triangles):
             continue
-        lit = light(triangles, np.concatenate([w.weights for w in found]))
+        lit = light(triangles, np.concatenate([w.weights for w in walks]))
         begin = 0
-        for c, w in enumerate(found):
+        for c, w in enumerate(walks):
             arrived = w.carried * lit[begin : begin + len(w.carried), c]
             begin += len(w.carried)
             where = 2 * place[w.source] + number[w.source] % 2
@@ -229,13 +229,13 @@ def _key(
     )
     rng = np.random.default_rng(0)
     probes = light(*points_on(areas, (np.arange(PROBES) + 0.5) / PROBES, rng))
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for name in ("walk.py", "estimate.py"):
-        found.update(Path(__file__).with_name(name).read_bytes())
+        digest.update(Path(__file__).with_name(name).read_bytes())
     for array in (solid.corners, solid.middle, points, index, probes):
-        found.update(np.ascontiguousarray(array).tobytes())
-    found.update(repr((medium, seed, BLOCK)).encode())
-    return found.hexdigest()[:32]
+        digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update(repr((medium, seed, BLOCK)).encode())
+    return digest.hexdigest()[:32]
 
 
 def _take_up(file: Path | None, sums: np.ndarray, half: int) -> int:
@@ -244,11 +244,11 @@ def _take_up(file: Path | None, sums: np.ndarray, half: int) -> int:
     for kept in file.parent.glob(f"{file.stem.split('-')[0]}-*.npz") if file else ():
         try:
             with np.load(kept, allow_pickle=False) as stored:
-                done, found = int(stored["done"]), stored["sums"]
+                done, stored_sums = int(stored["done"]), stored["sums"]
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             continue
-        if found.shape == sums.shape and best < done <= half:
-            best, sums[:] = done, found
+        if stored_sums.shape == sums.shape and best < done <= half:
+            best, sums[:] = done, stored_sums
     return best
 
 

@@ -80,7 +80,7 @@ def back_lit(
     """Which of points (N, 3) on a solid are turned away from a lamp whose light reaches the other
     side of it, straight through the solid, within so many mm.
     """
-    found = np.zeros(len(points), bool)
+    lit_through = np.zeros(len(points), bool)
     for light in lights:
         direction, distance = towards(light, points)
         away = np.einsum("ni,ni->n", normals, direction) < 0
@@ -91,5 +91,5 @@ def back_lit(
         free = np.ones(len(points), bool)
         if light.shadow:
             free = everything.hits(beyond - everything.middle, direction, distance)[0] < 0
-        found |= away & (triangle >= 0) & out & free
-    return found
+        lit_through |= away & (triangle >= 0) & out & free
+    return lit_through

@@ -63,13 +63,13 @@ class Solid:
         """The first triangle (N,), -1 for none, that rays from `origins` (about `middle`) meet
         within `reach` mm, how far it is (N,), and where on it: u (N,), v (N,).
         """
-        found = self._scene.run(
+        hits = self._scene.run(
             np.ascontiguousarray(origins, np.float32),
             np.ascontiguousarray(directions, np.float32),
             np.broadcast_to(np.asarray(reach, np.float32), len(origins)).copy(),
             output=1,
         )
-        return found["primID"], found["tfar"], found["u"], found["v"]
+        return hits["primID"], hits["tfar"], hits["u"], hits["v"]
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ def walk(
     directions, state = np.empty((count, 3)), np.empty(count, np.uint64)
     _enter(np.asarray(normals, float), index.astype(np.uint64), key, eta, state, directions)
     weight, source = np.ones(count), np.arange(count)
-    found = []
+    ended = []
     while count:
         reach = np.empty(count)
         _lengths(state[:count], sigma_t, reach)
@@ -257,7 +257,7 @@ def walk(
         rules = (solid.normals, solid.bounds, albedo, g, eta)
         count, left = _event(*walking, reach, *hit, *rules, *out)
         if left:
-            found.append([array[:left] for array in out])
-    if not found:
+            ended.append([array[:left] for array in out])
+    if not ended:
         return Walks(np.empty(0, int), np.empty(0, int), np.empty((0, 3)), np.empty(0))
-    return Walks(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    return Walks(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))

@@ -34,7 +34,7 @@ def kernels(curve: Curve, kind: str, guide_k: float) -> list[separable.Kernel]:
     nearest to the curve (whose own rings are too noisy near the middle to be decomposed).
     """
     fit = fits.gaussian_sum(curve, 6)
-    found = []
+    made = []
     for c in range(curve.channels):
         share, radius = curve._quantiles(c)
         reach = float(np.interp(REACH_SHARE, share, radius))
@@ -43,12 +43,12 @@ def kernels(curve: Curve, kind: str, guide_k: float) -> list[separable.Kernel]:
             return gaussians.reflectance(r, fit.variance_mm2, fit.weights[:, c])
 
         if kind == "guided":
-            found.append(separable.guided(profile, reach, guide_k, GRID))
+            made.append(separable.guided(profile, reach, guide_k, GRID))
         elif kind == "svd":
-            found.append(separable.svd(profile, reach, GRID))
+            made.append(separable.svd(profile, reach, GRID))
         else:
-            found.append(separable.artist_fit(profile, reach, GRID)[0])
-    return found
+            made.append(separable.artist_fit(profile, reach, GRID)[0])
+    return made
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,8 @@ class JimenezSeparable(RotatedTechnique):
                 pair = (np.array([near, far]) ** 2, np.array([[w], [1 - w]]))
                 weights[:, c] = gaussians.line_integral(edges[:-1], edges[1:], *pair)[:, 0]
             return offsets, weights
-        found = kernels(curve, self.kernel, self.guide_k)
-        return offsets, np.stack([kernel.taps(offsets) for kernel in found], axis=1)
+        made = kernels(curve, self.kernel, self.guide_k)
+        return offsets, np.stack([kernel.taps(offsets) for kernel in made], axis=1)
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         """Each tap stands for its interval: rotation and bilinear texels spread it so."""

@@ -1,5 +1,5 @@
-// What the walks found, where the medium scatters; elsewhere the light as it is.
-uniform sampler2D irradiance; uniform sampler2D found;
+// What the walks bring, where the medium scatters; elsewhere the light as it is.
+uniform sampler2D irradiance; uniform sampler2D walked;
 uniform float walks;
 layout(location = 0) out vec4 scattered;
 layout(location = 1) out vec4 count;
@@ -8,6 +8,6 @@ void main() {
     scattered = texelFetch(irradiance, at, 0);
     count = vec4(0.0);
     if (scattered.a < 0.5) return;
-    scattered.rgb = texelFetch(found, at, 0).rgb;
+    scattered.rgb = texelFetch(walked, at, 0).rgb;
     count.x = walks;
 }

@@ -73,14 +73,14 @@ class Reference(Technique):
 
     def scatter(self, inputs: Inputs) -> Scattered:
         where = inputs.irradiance.read()[..., 3] > 0.5
-        found = np.zeros((inputs.height, inputs.width, 4), np.float32)
-        found[where, :3] = self.halves(inputs, where).mean
-        texture = gl.Texture(inputs.width, inputs.height, GL.GL_RGBA32F, data=found[::-1])
+        scattered = np.zeros((inputs.height, inputs.width, 4), np.float32)
+        scattered[where, :3] = self.halves(inputs, where).mean
+        texture = gl.Texture(inputs.width, inputs.height, GL.GL_RGBA32F, data=scattered[::-1])
         try:
             with result(inputs) as target:
                 target.bind()
                 inputs.programs("techniques/reference.glsl").use(
-                    irradiance=inputs.irradiance, found=texture, walks=float(self.walks)
+                    irradiance=inputs.irradiance, walked=texture, walks=float(self.walks)
                 )
                 gl.draw_fullscreen(inputs.context)
         finally:

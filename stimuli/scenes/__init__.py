@@ -108,8 +108,8 @@ def _own_medium(entry: Mapping[str, Any]) -> dict[str, Any]:
         return {}  # what is wrong with it is said where it is read
     from stimuli.heads.formats import Source, gltf
 
-    found = gltf.medium(Source(file), unit)
-    return {} if found is None else {"medium": found}
+    medium = gltf.medium(Source(file), unit)
+    return {} if medium is None else {"medium": medium}
 
 
 def person_table(name_or_path: str) -> dict[str, Any]:

@@ -38,7 +38,7 @@ def test_form_factors_are_reciprocal_and_their_rows_sum_to_one(room):
     sent = made.area[:, None] * made.F
     np.testing.assert_allclose(sent, sent.T, atol=1e-9 * sent.max())
     # by rays alone, reciprocity holds within the noise of a binomial count
-    share = made.found[seen][:, seen]
+    share = made.counted[seen][:, seen]
     area = made.area[seen]
     spread = area[:, None] ** 2 * share * (1 - share) / COARSE.rays
     off = (area[:, None] * share - (area[:, None] * share).T) / np.sqrt(spread + spread.T + 1e-9)

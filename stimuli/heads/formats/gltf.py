@@ -105,7 +105,7 @@ def medium(source: Source, unit_mm: float) -> dict | None:
     try:
         glb = source.path.suffix.lower() == ".glb"
         document = _glb(source, data)[0] if glb else json.loads(data)
-        found = [
+        media = [
             _medium(source, str(material.get("name", k)), material.get("extensions", {}), unit_mm)
             for k, material in enumerate(document.get("materials", []))
             if "KHR_materials_volume_scatter" in material.get("extensions", {})
@@ -115,12 +115,12 @@ def medium(source: Source, unit_mm: float) -> dict | None:
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         reason = f"{type(error).__name__}: {error}".replace("\n", " ")
         raise source.error(f"is not valid glTF ({reason}); expected a validator's glTF") from None
-    if any(other != found[0] for other in found):
+    if any(other != media[0] for other in media):
         raise source.error(
-            f"has {len(found)} materials that scatter differently; expected one medium, or a "
+            f"has {len(media)} materials that scatter differently; expected one medium, or a "
             "medium in the scene"
         )
-    return found[0] if found else None
+    return media[0] if media else None
 
 
 def _medium(source: Source, name: str, extensions: dict, unit_mm: float) -> dict:
