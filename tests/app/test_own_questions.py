@@ -139,7 +139,7 @@ def test_programs_go_through_all_of_it(study_dir):
 
 def test_reasons_are_asked_of_a_share_that_the_seed_draws(tmp_path, write_study):
     app = create_app(write_study(tmp_path / "study", reason={"share": 0.4}))
-    asked = app.extensions["study"].definition.reason.applies
+    applies = app.extensions["study"].definition.reason.applies
     drawn = [applies(f"7/{person}", order) for person in range(50) for order in range(30)]
     assert drawn == [applies(f"7/{p}", order) for p in range(50) for order in range(30)]
     assert 0.35 < sum(drawn) / len(drawn) < 0.45
