@@ -193,6 +193,8 @@ class Frame:
                 self._shared,
                 self.surface,
                 r.lamps,
+                r.media[medium - 1] if r.media else None,
+                r.surroundings,
             ),
             piece.first,
             self.height,

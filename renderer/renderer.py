@@ -155,13 +155,16 @@ class Renderer:
         diffuse: str = "lambert",
         only_irradiance: bool = False,
         translucency: Translucency | None = None,
+        light: str | int = "all",
     ) -> gl.Target:
         """A surface's light over its texture atlas ("ATLAS") or over points on it ("POINTS").
 
         size: (width, height) in texels; points: from `surfaces.points`, whose size it is; point_mm:
         what a point stands for, finer relief fades; diffuse: how light passes the face;
         only_irradiance: specular and transmitted light are left out, which takes two thirds of
-        the time; translucency: how what comes through is reckoned, None for nothing. The target has
+        the time; translucency: how what comes through is reckoned, None for nothing; light: "all",
+        "lamps" or "environment" (with what surfaces send each other) alone, "none", or the number
+        of a lamp. The target has
         PLACED_FORMATS; the caller frees it. Specular light, and Disney's diffuse, are those towards
         the subject's front.
         """
@@ -174,7 +177,7 @@ class Renderer:
             "projection": np.eye(4),
             "point_mm": point_mm,
         }
-        light = (self.lamps, self.surroundings)
-        rest = (domain, drawn, points, diffuse, only_irradiance, translucency)
-        self.surfaces.draw(self.program, *light, shared, *rest)
+        sources = (self.lamps, self.surroundings)
+        rest = (domain, drawn, points, diffuse, only_irradiance, translucency, light)
+        self.surfaces.draw(self.program, *sources, shared, *rest)
         return target

@@ -8,6 +8,7 @@ from above, - from below.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -60,6 +61,38 @@ def _multipoles(stack: Stack) -> list[tuple[Multipole, Multipole]]:
     return out
 
 
+def hankel(
+    spectra: Callable[[np.ndarray], np.ndarray], r_mm: np.ndarray, finest_mm: float
+) -> np.ndarray:
+    """f(r) = (1 / 2 pi) int f(k) J0(k r) k dk, radii of one octave at a time: (N, S).
+
+    spectra: k (K, 1) in 1/mm -> (K, S); finest_mm: the least depth of a source, whose spectrum
+    falls as exp(-k z).
+    """
+    octave = np.floor(np.log2(np.maximum(r_mm / finest_mm, 1)))
+    parts = {each: _octave(spectra, r_mm[octave == each], finest_mm) for each in np.unique(octave)}
+    out = np.empty((len(r_mm), next(iter(parts.values())).shape[1]))
+    for each, values in parts.items():
+        out[octave == each] = values
+    return out
+
+
+def _octave(spectra: Callable, r: np.ndarray, finest_mm: float) -> np.ndarray:
+    """By panels of Gauss and Legendre that J0 of the largest radius crosses in three periods."""
+    k_max = 40 / finest_mm
+    panels = max(int(np.ceil(k_max * r.max() / (6 * np.pi))), 20)
+    # Finer towards k = 0, where weak absorption bends the spectrum.
+    edges = k_max * np.linspace(0, 1, panels + 1)
+    edges = np.unique(np.concatenate([edges, edges[1] * np.geomspace(1e-4, 1, 24)]))
+    t, w = np.polynomial.legendre.leggauss(24)
+    half = 0.5 * np.diff(edges)
+    k = (0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * t).ravel()
+    w = (half[:, None] * w).ravel()
+    weighted = spectra(k[:, None]) * (w * k / (2 * np.pi))[:, None]
+    parts = np.array_split(r, max(len(r) * len(k) // 4_000_000, 1))
+    return np.concatenate([j0(np.outer(part, k)) @ weighted for part in parts if len(part)])
+
+
 @dataclass(frozen=True)
 class Layered(Profile):
     """R_d(r) and T_d(r) of a stack.
@@ -106,7 +139,7 @@ class Layered(Profile):
     def _profiles(self, r_mm) -> tuple[np.ndarray, np.ndarray]:
         return self._hankel(r_mm) if self.method == "hankel" else self._fft(r_mm)
 
-    def _finest_mm(self) -> float:
+    def finest_mm(self) -> float:
         """The shortest distance from a first source to a face."""
         out = []
         for layer in self.stack.layers:
@@ -117,40 +150,20 @@ class Layered(Profile):
         return float(min(out))
 
     def _hankel(self, r_mm) -> tuple[np.ndarray, np.ndarray]:
-        """f(r) = (1 / 2 pi) int f(k) J0(k r) k dk, radii of one octave at a time."""
         r = radii(r_mm)[:, 0]
-        if r.max() > FARTHEST * self._finest_mm():
+        finest = self.finest_mm()
+        if r.max() > FARTHEST * finest:
             raise InputError(
                 f"{self.name}: a radius of {r.max():.3g} mm is too far for layers as fine as "
-                f"{self._finest_mm():.3g} mm; "
-                f"expected at most {FARTHEST * self._finest_mm():.3g} mm"
+                f"{finest:.3g} mm; expected at most {FARTHEST * finest:.3g} mm"
             )
-        out = np.empty((len(r), 2 * self.stack.channels))
-        octave = np.floor(np.log2(np.maximum(r / self._finest_mm(), 1)))
-        for each in np.unique(octave):
-            out[octave == each] = self._octave(r[octave == each])
-        return out[:, : self.stack.channels], out[:, self.stack.channels :]
 
-    def _octave(self, r: np.ndarray) -> np.ndarray:
-        """R and T side by side, (N, 2 C), by panels of Gauss and Legendre that J0 of the largest
-        radius crosses in three periods.
-        """
-        k_max = 40 / self._finest_mm()
-        panels = max(int(np.ceil(k_max * r.max() / (6 * np.pi))), 20)
-        # Finer towards k = 0, where weak absorption bends the spectrum.
-        edges = k_max * np.linspace(0, 1, panels + 1)
-        edges = np.unique(np.concatenate([edges, edges[1] * np.geomspace(1e-4, 1, 24)]))
-        t, w = np.polynomial.legendre.leggauss(24)
-        half = 0.5 * np.diff(edges)
-        k = (0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * t).ravel()
-        w = (half[:, None] * w).ravel()
-        faces = self.spectrum(k[:, None])
-        both = (
-            np.concatenate([faces.R, np.broadcast_to(faces.T, faces.R.shape)], axis=1)
-            * (w * k / (2 * np.pi))[:, None]
-        )
-        parts = np.array_split(r, max(len(r) * len(k) // 4_000_000, 1))
-        return np.concatenate([j0(np.outer(part, k)) @ both for part in parts if len(part)])
+        def spectra(k: np.ndarray) -> np.ndarray:
+            faces = self.spectrum(k)
+            return np.concatenate([faces.R, np.broadcast_to(faces.T, faces.R.shape)], axis=1)
+
+        out = hankel(spectra, r, finest)
+        return out[:, : self.stack.channels], out[:, self.stack.channels :]
 
     def grid(
         self, size: int = FFT_SIZE, spacing_mm: float | None = None
@@ -160,7 +173,7 @@ class Layered(Profile):
         Profiles are tabulated on a size x size grid that holds twice the support (no wrap), times
         spacing^2 a convolution, which Vuletic eqs. 2.77 f. and Rohat sec. 5.1.2 leave out.
         """
-        delta = spacing_mm or self._finest_mm() / 5
+        delta = spacing_mm or self.finest_mm() / 5
         x = delta * np.minimum(np.arange(size), size - np.arange(size))
         radius = np.hypot(x[: size // 2 + 1, None], x[None, : size // 2 + 1])
         # Each profile is evaluated along a radius once and looked up; cubic in r^2 near the peak.

@@ -29,6 +29,7 @@ uniform vec2 crows_feet_place; uniform vec4 crows_feet; uniform vec2 crows_feet_
 uniform vec4 lid_lines; uniform vec2 lid_lines_half; uniform float lid_lines_period;
 uniform vec2 wrinkles_behind;  // the eyes: on the forehead, around the eyes
 uniform float material_id;           // 1, 2, ...: which medium scatters below; 0: none
+uniform float even_light;           // 1, or 0: what the environment and other surfaces send is left out
 uniform vec3 noise_origin;           // mm: the seed's place in the solid noise
 
 float fade(float size_mm, float pixel_mm) { float r = pixel_mm / size_mm; return 1.0 / (1.0 + 6.0 * r * r); }
@@ -243,7 +244,7 @@ void main() {
 #endif
 
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
-    vec3 irradiance = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
+    vec3 irradiance = even_light * max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
     float nv = max(dot(n, v), 0.02);
     irradiance *= goes_in_even(nv, m);
     vec3 specular = vec3(0.0);  // left out with DIFFUSE_ONLY

@@ -116,18 +116,24 @@ class Surfaces:
         diffuse: str = "lambert",
         only_irradiance: bool = False,
         translucency: Translucency | None = None,
+        light: str | int = "all",
     ) -> None:
         """Shade into the bound target: everything, or over a domain `only` one surface.
 
         shared: camera_position, view, projection (and point_mm for POINTS); points: those of the
         domain POINTS; diffuse: how light passes the face (renderer.optics.surface);
         only_irradiance: without specular and transmitted light; translucency: how what comes
-        through is reckoned, over other domains than the screen.
+        through is reckoned, over other domains than the screen; light: "all", "lamps" or
+        "environment" alone, "none", or the number of a lamp.
         """
         defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": domain}
         values = {**shared, **lamps.uniforms(), **surroundings.uniforms(), "face_table": self.face}
         own = {**defines, "DIFFUSE": surface.DIFFUSE.index(diffuse)}
         values["mean_radiance"] = surroundings.mean()
+        values["even_light"] = float(light in ("all", "environment"))
+        if light not in ("all", "lamps"):
+            lit = np.arange(len(values["lamp_irradiance"])) == light
+            values["lamp_irradiance"] = values["lamp_irradiance"] * lit[:, None]
         if only_irradiance:
             own["DIFFUSE_ONLY"] = 1
         if points is not None:

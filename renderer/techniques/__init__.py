@@ -18,6 +18,7 @@ from renderer.techniques.jimenez_separable import JimenezSeparable
 from renderer.techniques.none import NoScattering
 from renderer.techniques.reference import Reference
 from renderer.techniques.splat_dipole import SplatDipole
+from renderer.techniques.splat_multipole import SplatMultipole
 
 TECHNIQUES: dict[str, type[Technique]] = {
     "none": NoScattering,
@@ -30,6 +31,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "gosselin": Gosselin,
     "deon_luebke": DeonLuebke,
     "splat_dipole": SplatDipole,
+    "splat_multipole": SplatMultipole,
     "reference": Reference,
 }
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from renderer import gl
+    from renderer.passes.environment import Surroundings
     from renderer.passes.lamps import Lamps
     from renderer.passes.points import Points
     from renderer.passes.surfaces import Drawn
@@ -65,10 +66,11 @@ class Inputs:
 class Room:
     """Where a medium's surfaces are, and their light over their atlases or at points on them.
 
-    surfaces: those of the medium at hand; medium: its id. placed(drawn, domain, size, points,
-    point_mm): a surface's light over "ATLAS" or "POINTS", see Renderer.placed. points(drawn, faces,
-    weights): points on it. camera: the uniforms camera_position, view and projection;
-    depth: the target whose depth buffer holds what is seen; lamps: with the layers of their maps.
+    surfaces: those of the medium at hand; medium: its id; value: what the scene names it.
+    placed(drawn, domain, size, points, point_mm): a surface's light over "ATLAS" or "POINTS", see
+    Renderer.placed. points(drawn, faces, weights): points on it. camera: the uniforms
+    camera_position, view and projection; depth: the target whose depth buffer holds what is seen;
+    lamps: with the layers of their maps; surroundings: the environment.
     """
 
     surfaces: tuple[Drawn, ...]
@@ -78,6 +80,8 @@ class Room:
     camera: dict[str, Any]
     depth: gl.Target
     lamps: Lamps
+    value: str | dict | None
+    surroundings: Surroundings
 
 
 @dataclass(frozen=True)

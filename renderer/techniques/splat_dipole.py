@@ -16,56 +16,38 @@ from renderer.optics import fits
 from renderer.optics.curve import Curve
 from renderer.optics.transmittance import MODELS
 from renderer.parameters import parameter
-from renderer.techniques.points import PointsTechnique
+from renderer.techniques.points import PointsTechnique, Tables, blurred, distances
 
 
 @dataclass(frozen=True)
 class SplatDipole(PointsTechnique):
-    """Points over the mesh (ch. 5.3), under any lights and environment.
+    """Points over the mesh or a grid from each lamp, under any lights and environment.
 
-    The dipole is fitted to the medium's curve and normalised: the albedo is the surface's own.
-    radius "area": a splat holds `share` of the light; "published": of the integral over r alone,
-    which is less of the light (sec. 4.3). Light that comes through thin parts comes by the distance
-    itself, so that no other translucency is added.
+    Light that comes through thin parts comes by the distance itself, so that no other translucency
+    is added; the blur, which is for the face on which light enters, does not reach through them.
     """
 
     translucency: str = parameter(
         "none", choices=MODELS, source="Rohat 2012: distances go through the object"
-    )
-    radius: str = parameter(
-        "area", choices=("area", "published"), source="Rohat 2012, sec. 4.3: over r alone"
     )
 
     name: ClassVar[str] = "splat_dipole"
     title: ClassVar[str] = "Dipole splats"
     paper: ClassVar[str] = "Rohat 2012; Shah et al. 2009, doi:10.1109/TVCG.2008.200"
 
-    def dipole(self, curve: Curve) -> fits.DipoleFit:
-        """The dipole for a curve, no shallower than the spacing's blur."""
-        fit = fits.dipole(curve)
-        least = self.blur * self.spacing_mm
-        real = np.maximum(fit.real_mm, least)
-        virtual = fit.virtual_mm + (real - fit.real_mm)
-        return fits.DipoleFit(real, virtual, fit.sigma_tr, fit.error)
-
-    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
-        return self.dipole(curve).edge(x_mm)
-
-    def profile(self, curve: Curve, r_mm: np.ndarray) -> np.ndarray:
-        return self.dipole(curve).density(r_mm)
-
-    def reach_mm(self, curve: Curve) -> float:
-        fit = self.dipole(curve)
-        if self.radius == "area":
-            return float(fit.radius(self.share).max())
-        r = np.geomspace(1e-3, fit.radius(0.9999).max(), 4000)
-        inside = np.cumsum(fit.density(r) * np.gradient(r)[:, None], axis=0)
-        inside /= inside[-1]
-        return max(float(np.interp(self.share, inside[:, c], r)) for c in range(inside.shape[1]))
+    def tables(self, curve: Curve, medium: str | dict | None, spacing_mm: float) -> Tables:
+        fit, reach = fits.dipole(curve), self.reach_mm(curve, spacing_mm)
+        r = distances(reach)
+        near = blurred(fit, self.blur_mm(curve, spacing_mm)).density(r)[None]
+        far = fit.density(r)[None]
+        near[:, -1] = far[:, -1] = 0
+        whole = np.ones((1, near.shape[2]))
+        return Tables(reach, near, whole, far, np.array([np.inf]), deep=False, mixed=False)
 
     def self_check(self, curve: Curve) -> None:
-        fit = self.dipole(curve)
+        fit = fits.dipole(curve)
         r = np.geomspace(1e-4, 40 * fit.virtual_mm.max() + 20 / fit.sigma_tr.min(), 200_000)
         total = np.trapezoid(fit.density(r) * 2 * np.pi * r[:, None], r, axis=0)
         assert np.allclose(total, 1, atol=2e-3)
-        assert (np.diff(self.table(curve), axis=0) <= 1e-12).all()
+        tables = self.tables(curve, None, self.spacing_mm)
+        assert (np.diff(tables.near[0], axis=0) <= 1e-12).all()

@@ -56,14 +56,19 @@ def scatter(technique, inputs):
 
 
 @contextmanager
-def frame_of_ball(size):
-    """A frame of a ball alone, under one lamp."""
-    graph = scenes.stage(scenes.read_scene(BALL)).graph
+def drawn(table, size=(48, 48)):
+    """A frame of a scene's table, under its lamps."""
+    graph = scenes.stage(scenes.read_scene(table)).graph
     with (
         renderer.Renderer(graph, size, 1, rays=8, shadow_map=256) as drawing,
         drawing.frame() as frame,
     ):
         yield frame
+
+
+def frame_of_ball(size):
+    """A frame of a ball alone, under one lamp."""
+    return drawn(BALL, size)
 
 
 def edge_response(drawing, technique, curve, pixels_per_mm, depth_mm, tilt_deg=0.0):

@@ -82,7 +82,8 @@ def test_the_light_that_comes_through_is_added_for_scattering_techniques_alone(f
     assert (gain >= 0).all() and gain[:, 0].max() > 0.1 and gain[:, 0].sum() > 2 * gain[:, 2].sum()
     without = {name for name in renderer.TECHNIQUES if renderer.make(name).transmission is None}
     # to splats and walks, light comes through by distance; deon_luebke has maps of its own
-    assert without == {"none", "splat_dipole", "reference", "deon_luebke"}
+    own = {"none", "splat_dipole", "splat_multipole", "reference", "deon_luebke"}
+    assert without == own
 
 
 def test_texturing_before_and_after_agree_where_nothing_is_to_blur(frames):

@@ -5,9 +5,10 @@ import pytest
 
 import renderer
 from renderer.errors import InputError
+from renderer.optics import fits
 from renderer.scene import shapes
-from renderer.techniques.points import spread
-from tests.renderer.slab import frame_of_ball, lit, places, surface_edge_response
+from renderer.techniques.samples import spread
+from tests.renderer.slab import drawn, frame_of_ball, lit, places, surface_edge_response
 from tests.renderer.test_techniques import SKIN
 
 
@@ -59,7 +60,7 @@ def test_more_points_give_the_same_brightness(ball):
         return np.repeat(np.clip(0.5 + place[..., :1] / 40, 0, 1), 3, axis=-1)
 
     made = [
-        renderer.make("splat_dipole", {"spacing_mm": s, "weights": "published", "blur": 0.0})
+        renderer.make("splat_dipole", {"spacing_mm": s, "weights": "published", "blur": 1.05 / s})
         for s in (1.5, 0.75)
     ]
     _, scatters = places(ball)
@@ -90,10 +91,35 @@ def test_the_papers_radius_clips_more():
     technique = renderer.make("splat_dipole")
     paper = renderer.make("splat_dipole", {"radius": "published"})
     assert paper.reach_mm(SKIN) < 0.7 * technique.reach_mm(SKIN)
-    inside = technique.dipole(SKIN).cdf(np.array([technique.reach_mm(SKIN)]))
-    assert inside.min() == pytest.approx(0.99, abs=1e-3)
+    assert technique.clipped(SKIN).max() == pytest.approx(0.01, abs=1e-3)
+    assert paper.clipped(SKIN)[0] > 0.08
 
 
 def test_too_many_points_are_refused(ball):
     with pytest.raises(InputError, match="spacing_mm is 0.05.* at most 4000000 points"):
         ball.render(renderer.make("splat_dipole", {"spacing_mm": 0.05}))
+
+
+def behind_a_sheet(thickness_mm, medium="deon_luebke"):
+    """A frame's table: a sheet that a lamp behind it lights, seen from its dark side."""
+    return {
+        "objects": {
+            "sheet": {"shape": "sheet", "size_mm": [40.0, 40.0], "thickness_mm": thickness_mm}
+        },
+        "materials": {"sheet": {"medium": medium, "albedo": [0.8, 0.8, 0.8]}},
+        "lights": {"lamp": {"direction": [0.0, 0.0, -1.0], "irradiance": [1.0, 1.0, 1.0]}},
+        "environment": {"ambient": [0.0, 0.0, 0.0]},
+        "camera": {"framing": "sheet", "height_mm": 20.0, "angle": "front"},
+    }
+
+
+def test_the_blur_does_not_reach_through_a_sheet():
+    """Behind 2 mm a dipole by the distance itself sends 1 - P(2 mm) of the light (its shell),
+    however far apart points are."""
+    with drawn(behind_a_sheet(2.0)) as frame:
+        for spacing in (0.7, 2.0):
+            technique = renderer.make("splat_dipole", {"spacing_mm": spacing})
+            with frame.scatter(technique) as target:
+                got = target.textures[0].read()[..., :3].mean(axis=(0, 1))
+            shell = 1 - fits.dipole(SKIN).cdf(np.array([2.0]))[0]
+            np.testing.assert_allclose(got, shell, atol=0.01)
