@@ -5,9 +5,10 @@
 # make test-postgres  install PostgreSQL and its driver, run the tests of the questionnaire over it
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
+# make translations   collect the messages of the pages into app/translations/*/*.po and compile them
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-bayes test-postgres demo bench clean
+.PHONY: help setup test test-bayes test-postgres demo bench translations clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -54,6 +55,14 @@ endif
 
 bench: setup
 	@for name in $(BENCH); do printf '\n== %s\n' "$$name"; PYTHONPATH=. .venv/bin/python "benchmarks/$$name.py" || exit 1; done
+
+translations: setup
+	mkdir -p build
+	.venv/bin/pybabel -q extract -F app/translations/babel.cfg -k message -k lazy_gettext \
+		--no-location --sort-output -o build/messages.pot .
+	.venv/bin/pybabel -q update -i build/messages.pot -d app/translations --no-fuzzy-matching \
+		--ignore-obsolete --no-wrap
+	.venv/bin/pybabel -q compile -d app/translations
 
 clean:
 	rm -rf build *.egg-info

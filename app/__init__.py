@@ -32,7 +32,7 @@ def create_app(
     trusted_hosts: names under which the server is asked; others are refused. Any where empty.
     metrics_token: who shows it may read /metrics; nobody without one.
     """
-    from app import dashboard, monitoring, questionnaire, security, web
+    from app import dashboard, language, monitoring, questionnaire, security, web
     from app.database import Database
     from app.simulation import views as simulation
     from app.study import Study
@@ -55,6 +55,7 @@ def create_app(
     app.config.update(HOSTS=tuple(trusted_hosts), METRICS_TOKEN=metrics_token)
     security.init(app)
     web.init(app)
+    language.init(app)
     app.register_blueprint(monitoring.blueprint)
     app.register_blueprint(questionnaire.blueprint)
     app.register_blueprint(dashboard.blueprint)

@@ -187,6 +187,27 @@ COLUMNS = (
         "Whether the participant answered every question",
         lambda r: int(r.participant.completed_at is not None),
     ),
+    Column(
+        "language",
+        "text",
+        "en, it, pt, zh",
+        "Language of the page that asked; empty: answered before it was recorded",
+        lambda r: r.response.language or "",
+    ),
+    Column(
+        "consent_language",
+        "text",
+        "en, it, pt, zh",
+        "Language of the consent that the participant read; empty: before it was recorded",
+        lambda r: r.participant.consent_language or "",
+    ),
+    Column(
+        "consent_sha256",
+        "text",
+        "64 hexadecimal digits",
+        "SHA-256 of the consent text as it was shown, which the codebook lists by language",
+        lambda r: r.participant.consent_sha256 or "",
+    ),
     Column("study", "text", "", "Name of the study", lambda r: r.study.name),
     Column("study_version", "integer", "from 1", "Version of the study", lambda r: r.study.version),
     Column(
@@ -635,6 +656,7 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
             for condition in definition.techniques
         ),
         *(f"- reason {place}: {tick}" for place, tick in enumerate(definition.reason.ticks, 1)),
+        *(f"- consent in {name}: `{study.consent_sha256(name)}`" for name in definition.languages),
         "",
         f"Familiarity: {definition.familiarity.question}",
         "",

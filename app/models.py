@@ -105,6 +105,9 @@ class Participant(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     visit: Mapped[str] = mapped_column(String(64), unique=True)  # random, from the signed cookie
     consented_at: Mapped[datetime] = mapped_column(default=now)
+    # of the text that was agreed to, and the text's hash; None: began before it was recorded
+    consent_language: Mapped[str | None] = mapped_column(String(16))
+    consent_sha256: Mapped[str | None] = mapped_column(String(64))
     familiarity: Mapped[int | None]
     completion_code: Mapped[str | None] = mapped_column(String(16), unique=True)  # to be shown
     # to be kept; None: completed before there was one, when the code did both
@@ -194,6 +197,7 @@ class Response(Base):
     rt_server_ms: Mapped[int | None]
     reason_ticks: Mapped[str | None] = mapped_column(String(100))  # numbers from 1: "1;3"
     reason_text: Mapped[str | None] = mapped_column(String(2000))
+    language: Mapped[str | None] = mapped_column(String(16))  # of the page
     rt_reported_ms: Mapped[int | None]  # where it was more than the server's clock allows
 
     trial: Mapped[Trial] = relationship(back_populates="response")

@@ -13,6 +13,7 @@ from enum import Enum
 from sqlalchemy import and_, func, or_, select
 from sqlalchemy.orm import Session
 
+from app.catalogues import message
 from app.models import LogEntry, Participant, Response, StudyRecord, now
 from app.study import Study
 
@@ -29,18 +30,18 @@ STATES = {
 
 
 class Door(Enum):
-    """What a visitor finds; the value is what the page says."""
+    """What a visitor finds; the value is what the page says, in English."""
 
     OPEN = ""
-    DRAFT = "This study has not begun yet. Please come back later."
-    PAUSED = "This study takes a pause. Please come back later."
-    CLOSED = "This study has ended. Thank you for your interest."
-    FULL = "All places of this study are taken. Thank you for your interest."
-    AGAIN = (
+    DRAFT = message("This study has not begun yet. Please come back later.")
+    PAUSED = message("This study takes a pause. Please come back later.")
+    CLOSED = message("This study has ended. Thank you for your interest.")
+    FULL = message("All places of this study are taken. Thank you for your interest.")
+    AGAIN = message(
         "You have begun this study already. Go on in the browser in which you began, or by the "
         "code that it gave you."
     )
-    STRANGER = "Please come by the link that you were given: it says who is to be paid."
+    STRANGER = message("Please come by the link that you were given: it says who is to be paid.")
 
 
 def record_of(session: Session, *, lock: bool = False) -> StudyRecord:

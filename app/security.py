@@ -14,6 +14,7 @@ from datetime import timedelta
 
 from flask import Flask, Response, abort, current_app, request
 from flask.sessions import SecureCookieSessionInterface
+from flask_babel import gettext
 from flask_wtf import CSRFProtect
 from werkzeug.sansio.utils import host_is_trusted
 
@@ -114,13 +115,13 @@ def init(app: Flask) -> None:
 def _refuse_other_hosts() -> None:
     hosts = current_app.config["HOSTS"]  # Flask's TRUSTED_HOSTS leaves no page to say so
     if hosts and not host_is_trusted(request.host, hosts):
-        abort(400, "This server is not asked under this name.")
+        abort(400, gettext("This server is not asked under this name."))
 
 
 def _refuse_nul() -> None:
     """PostgreSQL takes no NUL in a text, and no page of ours sends one."""
     if any("\0" in value for value in (*request.args.values(), *request.form.values())):
-        abort(400, "A field held a character that is none.")
+        abort(400, gettext("A field held a character that is none."))
 
 
 def _headers(response: Response) -> Response:

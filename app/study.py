@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from babel.support import NullTranslations
+
+from app.catalogues import catalogue, message
 from stimuli.manifest import Image, Manifest, load_manifest
 from stimuli.study import Study as Definition
 
@@ -14,13 +18,14 @@ from stimuli.study import Study as Definition
 SECONDS_A_QUESTION = (20, 30)
 #: What app.models stores of a person, in words; tests hold it to the tables.
 RECORDED = (
-    "your self-rating",
-    "your answers",
-    "the times at which you began, answered and ended",
-    "how often a question was opened",
-    "the size of your window and of the images on it, and its scaling",
-    "how you looked at each pair (views, zoom, how long)",
-    "how long the page was out of sight",
+    message("your self-rating"),
+    message("your answers"),
+    message("the times at which you began, answered and ended"),
+    message("how often a question was opened"),
+    message("the size of your window and of the images on it, and its scaling"),
+    message("how you looked at each pair (views, zoom, how long)"),
+    message("how long the page was out of sight"),
+    message("the language of the pages"),
 )
 
 
@@ -105,34 +110,58 @@ class Study:
     def image(self, cell: str, technique: str) -> Image:
         return self.manifest.image(cell, technique)
 
-    @property
-    def consent(self) -> tuple[str, ...]:
-        """The paragraphs of the consent text, with what is asked and stored filled in."""
+    @cached_property
+    def _translated(self) -> dict[str, Definition]:
+        return {name: self.definition.translated(name) for name in self.definition.languages}
+
+    def in_language(self, language: str) -> Definition:
+        """The definition with its texts in a language, or as they are where it has none such."""
+        return self._translated.get(language, self.definition)
+
+    def consent(self, language: str) -> tuple[str, ...]:
+        """The paragraphs of the consent text in a language, with what is asked and stored filled
+        in.
+        """
+        words = catalogue(language)
         questions = self.definition.questions
         low, high = (max(1, round(questions * seconds / 60)) for seconds in SECONDS_A_QUESTION)
         filled = {
             "questions": str(questions),
-            "minutes": str(low) if low == high else f"{low} to {high}",
-            "recorded": self._recorded,
+            "minutes": str(low)
+            if low == high
+            else words.gettext("%(low)s to %(high)s") % {"low": low, "high": high},
+            "recorded": self._recorded(words),
         }
-        text = self.definition.consent
+        text = self.in_language(language).consent
         for name, value in filled.items():
             text = text.replace(f"{{{name}}}", value)
         return tuple(text.split("\n\n"))
 
-    @property
-    def _recorded(self) -> str:
+    def consent_sha256(self, language: str) -> str:
+        """The hash of the consent text in a language as the page shows it; the same hash is the
+        same text.
+        """
+        return hashlib.sha256("\n\n".join(self.consent(language)).encode()).hexdigest()
+
+    def _recorded(self, words: NullTranslations) -> str:
         """What is stored of a participant, with what this study asks beside the pairs."""
-        definition, parts = self.definition, list(RECORDED)
+        definition, parts = self.definition, [words.gettext(part) for part in RECORDED]
         if own := len(definition.before) + len(definition.after):
-            parts.append(f"your answers to {own} other question{'s' if own > 1 else ''}")
+            text = words.ngettext(
+                "your answers to %(num)s other question",
+                "your answers to %(num)s other questions",
+                own,
+            )
+            parts.append(text % {"num": own})
         if definition.screen.check:
-            parts.append("the size of your screen's pixels, its greys and the zoom")
+            parts.append(words.gettext("the size of your screen's pixels, its greys and the zoom"))
         if definition.reason.share:
-            parts.append("the reasons that you give for a choice")
+            parts.append(words.gettext("the reasons that you give for a choice"))
         if names := ", ".join(definition.recruiting.parameters):
-            parts.append(f"what your recruiter's link says of you ({names})")
-        return f"{'; '.join(parts[:-1])}; and {parts[-1]}"
+            text = words.gettext("what your recruiter's link says of you (%(names)s)")
+            parts.append(text % {"names": names})
+        several = words.gettext("; ").join(parts[:-1])
+        return words.gettext("%(several)s; and %(last)s") % {"several": several, "last": parts[-1]}
 
     def database_url(self, simulated: bool) -> str:
         return (

@@ -18,6 +18,7 @@ from flask import (
     send_file,
     url_for,
 )
+from flask_babel import gettext, lazy_gettext
 from flask_wtf.csrf import CSRFError
 from werkzeug.exceptions import HTTPException
 
@@ -28,6 +29,14 @@ from stimuli.manifest import Image
 
 #: A year: an image's address is the hash of its bytes, so what it names never changes.
 IMMUTABLE = "public, max-age=31536000, immutable"
+
+#: What a page says of an error that says nothing of its own.
+STANDARD = {
+    404: lazy_gettext("There is nothing at this address. Please check it."),
+    405: lazy_gettext("This address takes no such request."),
+    413: lazy_gettext("What was sent is too large."),
+}
+OTHERWISE = lazy_gettext("The request could not be answered.")
 
 blueprint = Blueprint("web", __name__)
 
@@ -58,7 +67,7 @@ def init(app: Flask) -> None:
     app.register_blueprint(blueprint)
     app.register_error_handler(HTTPException, _error_page)
     app.add_template_filter(picture)
-    app.context_processor(lambda: {"study": study().definition, "simulated": simulated()})
+    app.context_processor(lambda: {"simulated": simulated()})
 
 
 def picture(image: Image) -> dict[str, str | int]:
@@ -81,7 +90,7 @@ def image(sha256: str) -> Response:
     """
     image_file = study().images_by_sha256.get(sha256)
     if image_file is None:
-        abort(404, "This study has no such image.")
+        abort(404, gettext("This study has no such image."))
     path = image_file.path.resolve()
     try:
         renditions.check(path, sha256)
@@ -100,7 +109,7 @@ def shown(sha256: str, box: str, width: int) -> Response:
     region = study().shown.get((sha256, box))
     wanted = region and renditions.Rendition(region, width)
     if wanted is None or not wanted.offered:
-        abort(404, "This study shows no such image.")
+        abort(404, gettext("This study has no such image."))
     # named, not by */*: every browser says the latter
     webp = any(kind == renditions.WEBP and q > 0 for kind, q in request.accept_mimetypes)
     try:
@@ -115,7 +124,7 @@ def shown(sha256: str, box: str, width: int) -> Response:
 
 def _gone(error: renditions.Changed) -> NoReturn:
     current_app.logger.error("%s", error)
-    abort(404, "The file of this image was changed after the study was opened.")
+    abort(404, gettext("The file of this image was changed after the study was opened."))
 
 
 @blueprint.get("/study.css")
@@ -136,11 +145,13 @@ def style() -> Response:
 
 
 def _error_page(error: HTTPException):
-    message = error.description
+    # what werkzeug says by itself is in English
+    standard = error.description == type(error).description
+    message = str(STANDARD.get(error.code, OTHERWISE)) if standard else error.description
     if isinstance(error, CSRFError):
-        message = (
-            "The page was too old, or your browser keeps no cookies. Allow cookies for "
-            "this site, reload and try again."
+        message = gettext(
+            "The page was too old, or your browser keeps no cookies. Allow cookies for this site, "
+            "reload and try again."
         )
     if wants_json():
         return jsonify(error=message, lost=isinstance(error, CSRFError)), error.code

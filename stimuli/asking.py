@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stimuli.errors import InputError
 from stimuli.table import Table, refuse_doubles
@@ -147,6 +147,15 @@ class Ask:
     def record(self) -> dict:
         return {**vars(self), "options": list(self.options)}
 
+    @property
+    def texts(self) -> dict:
+        """What people read of it."""
+        return {"text": self.text, **({"options": list(self.options)} if self.options else {})}
+
+    def worded(self, texts: dict) -> "Ask":
+        """The same in other words."""
+        return replace(self, text=texts["text"], options=tuple(texts.get("options", ())))
+
 
 @dataclass(frozen=True)
 class Reason:
@@ -212,15 +221,15 @@ def _labels(value: list, blanks: bool) -> bool:
     return texts and all(one.strip() for one in shown)
 
 
-def read_reason(table: Table) -> Reason:
-    """`[reason]` of a study, checked."""
+def read_reason(table: Table, why: str = Reason.text) -> Reason:
+    """`[reason]` of a study, checked; `why` is asked where it does not say what."""
     share = table.take(
         "share", (int, float), "a number from 0 to 1", lambda v: 0 <= v <= 1, default=0.0
     )
     ticks = table.take("ticks", list, "a list of texts", lambda v: _ticks(v), default=[])
     reason = Reason(
         float(share),
-        table.text("text", default=Reason.text),
+        table.text("text", default=why),
         tuple(ticks),
         table.take("free", bool, "true or false", default=True),
     )

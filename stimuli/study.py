@@ -7,8 +7,7 @@ its analysis (`analysis`: margins, tests, exclusions) may be left out too. Nothi
 nothing here knows which techniques and framings there are: `stimuli.build` asks the renderer.
 """
 
-import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import product
 from math import prod
@@ -31,6 +30,7 @@ from stimuli.asking import (
     read_screen,
 )
 from stimuli.errors import InputError
+from stimuli.languages import CONSENT, PLACEHOLDERS, WHY, placeholders, read_languages, read_texts
 from stimuli.parts import read_toml
 from stimuli.recruiting import Recruiting, read_recruiting
 from stimuli.scenes import load_table, merge
@@ -83,17 +83,10 @@ RESERVED = frozenset(
         "bright_steps_seen",
         "reason_ticks",
         "reason_text",
+        "language",
+        "consent_language",
+        "consent_sha256",
     }
-)
-#: What a consent text may say in braces; the page fills it in from what is asked and stored.
-PLACEHOLDERS = ("questions", "minutes", "recorded")
-#: For studies of ready-made images that bring no text of their own.
-CONSENT = (
-    "You will see pairs of images and answer one question about each pair. There are {questions} "
-    "questions; most people need {minutes} minutes, and there is no time limit. What is stored: "
-    "{recorded}. No name, address or other personal detail is asked for. Taking part is voluntary: "
-    "you can close the page at any time. The answers are analysed and published as statistics and "
-    "as an anonymous table."
 )
 UNITS = ("mm", "cm", "m", "in")  # of a scan's coordinates
 AXES = ("y", "z")  # that can point upwards in a scan
@@ -196,7 +189,8 @@ class Study:
     factors: framing first; cells: the combinations of their levels that are shown. `render` and
     `scene` (the table of the scene that levels patch) are None where the images are ready-made;
     `analysis` is what it declares of its analysis; `viewer` is how pairs are looked at;
-    `recruiting` is what a recruiter's link says.
+    `recruiting` is what a recruiter's link says; `languages` are those in which people are asked,
+    the first that of the texts here, and `texts` are those of the others (`stimuli.languages`).
     """
 
     name: str
@@ -222,6 +216,8 @@ class Study:
     reason: Reason = Reason()
     pages: Pages = Pages()
     screen: Screen = Screen()
+    languages: tuple[str, ...] = ("en",)
+    texts: dict[str, dict] = field(default_factory=dict)
 
     @property
     def framings(self) -> tuple[Level, ...]:
@@ -259,6 +255,51 @@ class Study:
             patch = next(v.patch for v in factor.levels if v.name == cell.levels[factor.name])
             table = merge(table, patch)
         return table
+
+    @property
+    def own_texts(self) -> dict:
+        """What people read of the study in its first language: the shape of the other languages'
+        texts.
+        """
+        pages = {key: getattr(self.pages, key) for key in ("instructions", "debrief")}
+        ticks = {"ticks": list(self.reason.ticks)} if self.reason.ticks else {}
+        return {
+            "title": self.title,
+            "consent": self.consent,
+            "question": dict(vars(self.question)),
+            "scale": [point.label for point in self.scale],
+            "familiarity": {
+                "question": self.familiarity.question,
+                "labels": list(self.familiarity.labels),
+            },
+            "reason": {"text": self.reason.text, **ticks} if self.reason.share else {},
+            "pages": {key: text for key, text in pages.items() if text},
+            "before": {ask.name: ask.texts for ask in self.before},
+            "after": {ask.name: ask.texts for ask in self.after},
+        }
+
+    def translated(self, language: str) -> "Study":
+        """The study with its texts in one of its languages."""
+        if language == self.languages[0]:
+            return self
+        texts = self.texts[language]
+        reason = {**texts["reason"], "ticks": tuple(texts["reason"].get("ticks", ()))}
+        return replace(
+            self,
+            title=texts["title"],
+            consent=texts["consent"],
+            question=replace(self.question, **texts["question"]),
+            scale=tuple(replace(p, label=text) for p, text in zip(self.scale, texts["scale"])),
+            familiarity=replace(
+                self.familiarity,
+                question=texts["familiarity"]["question"],
+                labels=tuple(texts["familiarity"]["labels"]),
+            ),
+            reason=replace(self.reason, **reason),
+            pages=replace(self.pages, **texts["pages"]),
+            before=tuple(ask.worded(texts["before"][ask.name]) for ask in self.before),
+            after=tuple(ask.worded(texts["after"][ask.name]) for ask in self.after),
+        )
 
     def record(self) -> dict:
         """What the manifest says of the study; `read_study` reads it back."""
@@ -299,6 +340,8 @@ class Study:
             "pages": vars(self.pages),
             "screen": self.screen.record(),
             **({"analysis": self.analysis} if self.analysis else {}),
+            **({"languages": list(self.languages)} if self.languages != ("en",) else {}),
+            **({"text": self.texts} if self.texts else {}),
         }
 
 
@@ -351,7 +394,8 @@ def read_study(
     """The study in a table of a TOML file or of a manifest; without `render`, images are
     ready-made. display: of a study that says nothing of it.
     """
-    default = _defaults() if render is not None else {**_defaults(), "consent": CONSENT}
+    languages = read_languages(table)
+    default = _defaults(languages[0], rendered=render is not None)
     wording = Table({**default, **table.value}, table.source, table.key)
     techniques = table.tables("techniques", least=2)
     factors = _factors(table, rendered=render is not None)
@@ -381,7 +425,7 @@ def read_study(
         viewer=read_viewer(table.table("viewer", default={}), display),
         before=asks[0],
         after=asks[1],
-        reason=read_reason(table.table("reason", default={})),
+        reason=read_reason(table.table("reason", default={}), WHY[languages[0]]),
         screen=read_screen(table.table("screen", default={})),
         pages=read_pages(table.table("pages", default={})),
         recruiting=read_recruiting(table.table("recruiting", default={})),
@@ -391,7 +435,9 @@ def read_study(
             {cell.name: cell.levels for cell in cells},
             [table.value["name"] for table in techniques],
         ),
+        languages=languages,
     )
+    study = replace(study, texts=_texts(table, study, rendered=render is not None))
     refuse_doubles(techniques, "name")
     refuse_doubles(techniques, "label")
     for part in techniques:
@@ -481,20 +527,50 @@ def _crossed_or_listed(table: Table, factors: tuple[Factor, ...]) -> tuple[Cell,
     return tuple(cells)
 
 
+def _texts(table: Table, study: Study, rendered: bool) -> dict[str, dict]:
+    """The texts in the further languages; those of a wording that the study leaves out are the
+    thesis's too.
+    """
+    defaults = {}
+    for language in study.languages[1:]:
+        wording = _defaults(language, rendered)
+        texts = {
+            "consent": wording["consent"],
+            "question": wording["question"],
+            "scale": [point["label"] for point in wording["scale"]],
+            "familiarity": wording["familiarity"],
+        }
+        defaults[language] = {k: v for k, v in texts.items() if k not in table.value}
+        asked = table.value.get("reason", {})
+        if study.reason.share and not {"text", "ticks"} & asked.keys():
+            defaults[language]["reason"] = {"text": WHY[language]}
+    return read_texts(table, study.languages, study.own_texts, defaults)
+
+
 def _consent(table: Table) -> str:
     text = table.text("consent")
-    for word in re.findall(r"\{([^{}]*)\}", text):
+    for word in placeholders(text):
         if word not in PLACEHOLDERS:
             known = ", ".join(f"{{{name}}}" for name in PLACEHOLDERS)
             raise table.fault("consent", f"{{{word}}}", f"one of {known}")
     return text
 
 
+def _defaults(language: str, rendered: bool) -> dict:
+    """The thesis's wording in a language; ready-made images have a consent of their own."""
+    thesis = _thesis()
+    wording = {key: thesis[key] for key in _WORDING}
+    if language != "en":
+        texts = thesis["text"][language]
+        points = zip(thesis["scale"], texts["scale"])
+        scale = [{**point, "label": text} for point, text in points]
+        wording = {**{key: texts[key] for key in _WORDING}, "scale": scale}
+    return wording if rendered else {**wording, "consent": CONSENT[language]}
+
+
 @cache
-def _defaults() -> dict:
-    """The thesis's wording."""
-    thesis = read_toml(THESIS)
-    return {key: thesis[key] for key in _WORDING}
+def _thesis() -> dict:
+    return read_toml(THESIS)
 
 
 def _condition(table: Table, rendered: bool, shared: dict) -> Condition:

@@ -27,6 +27,7 @@ MAY_IMPORT = {
         "stimuli.study",
         "stimuli.viewing",
         "stimuli.asking",
+        "stimuli.languages",
     },
 }
 PROFILE_VERBS = {

@@ -65,6 +65,7 @@ def test_it_holds_what_is_needed_and_no_package_of_another_name(wheel):
     for needed in (
         "app/templates/questionnaire/question.html",
         "app/static/style.css",
+        "app/translations/zh/LC_MESSAGES/messages.mo",
         "app/migrations/versions/0002_cells.py",
         "analysis/templates/report.typ",
         "analysis/templates/report.html",
@@ -91,6 +92,8 @@ from app.cli import main
 assert main(["build", "study.toml", "--out", "study"]) == 0
 page = app.create_app("study").test_client().get("/")
 assert page.status_code == 200 and b"Which ball?" in page.data
+from app.catalogues import catalogue
+assert catalogue("it").gettext("Continue") == "Continua"
 assert main(["simulate", "study", "--participants", "2", "--seed", "1"]) == 0
 answers = "study/simulated/responses.csv"
 assert main(["analyse", answers, "--study", "study", "--out", "report"]) == 0

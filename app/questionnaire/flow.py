@@ -71,6 +71,7 @@ class Answer:
     seen_share: float | None = None
     reason_ticks: str | None = None
     reason_text: str | None = None
+    language: str | None = None
 
 
 def find(session: Session, visit: str | None, *, lock: bool = False) -> Participant | None:
@@ -103,11 +104,13 @@ def enrol(
     *,
     insider: bool = False,
     link_fields: Mapping[str, str] = EMPTY,
+    consent: tuple[str, str] | tuple[None, None] = (None, None),
 ) -> Participant | Door:
     """The participant of a visit, with the trials assigned; consent given twice is one
     participant. The door where nobody can begin now.
 
-    link_fields: what the recruiter's link said (`recruiting.link_fields`).
+    link_fields: what the recruiter's link said (`recruiting.link_fields`). consent: the language
+    of the text that was agreed to, and its sha256.
     """
     record = recruiting.record_of(session, lock=True)  # before looking: two clicks are one person
     if participant := find(session, visit):
@@ -118,6 +121,7 @@ def enrol(
         return door
     pilot = record.state in ("draft", "pilot")
     participant = Participant(visit=visit, resume_code=_secret(), pilot=pilot)
+    participant.consent_language, participant.consent_sha256 = consent
     if link_fields:
         participant.recruit = json.dumps(dict(link_fields))
         participant.recruit_id = link_fields.get(study.definition.recruiting.parameters[0])

@@ -20,10 +20,11 @@ from flask import (
     session,
     url_for,
 )
+from flask_babel import gettext
 from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
-from app import password, recruiting
+from app import language, password, recruiting
 from app.models import Participant
 from app.questionnaire import flow, screen, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
@@ -59,7 +60,8 @@ _MEASURED = {
 
 @blueprint.context_processor
 def _wording() -> dict:
-    return {"words": wording.QUESTION, "mode_names": wording.MODES}
+    words = {key: str(text) for key, text in wording.QUESTION.items()}
+    return {"words": words, "mode_names": wording.MODES}
 
 
 @blueprint.get("/")
@@ -82,7 +84,7 @@ def welcome():
                 return _closed(door)
             return render_template(
                 "questionnaire/consent.html",
-                paragraphs=study().consent,
+                paragraphs=study().consent(language.current()),
                 # in no order that says anything: which are asked first is not drawn yet
                 upcoming=sorted(study().manifest.images, key=lambda image: image.sha256)[
                     : 2 * PRELOADED_QUESTIONS
@@ -98,22 +100,32 @@ def welcome():
 def consent():
     if "visit" not in session:
         abort(
-            400, "Your browser keeps no cookies. Allow cookies for this site, reload and try again."
+            400,
+            gettext(
+                "Your browser keeps no cookies. Allow cookies for this site, reload and try again."
+            ),
         )
     if request.form.get("consent") != "yes":
-        flash("Please tick the box if you want to take part.")
+        flash(gettext("Please tick the box if you want to take part."))
         return redirect(url_for(".welcome"), 303)
     newcomers = current_app.extensions["newcomers"]
     if newcomers and not newcomers.allow(request.remote_addr):
         abort(
             429,
-            "Very many people began from your network just now. Please wait some minutes and try "
-            "again.",
+            gettext(
+                "Very many people began from your network just now. Please wait some minutes and "
+                "try again."
+            ),
         )
     insider = password.logged_in()
     with database().write() as db:
         participant = flow.enrol(
-            db, study(), session["visit"], insider=insider, link_fields=session.get("recruit", {})
+            db,
+            study(),
+            session["visit"],
+            insider=insider,
+            link_fields=session.get("recruit", {}),
+            consent=_consented(),
         )
         if isinstance(participant, Door):
             return _closed(participant)
@@ -121,10 +133,17 @@ def consent():
     return redirect(url_for(place), 303)
 
 
+def _consented() -> tuple[str, str]:
+    """The language of the consent that was agreed to, and the hash of its text."""
+    read = request.form.get("language")
+    read = read if read in study().definition.languages else language.current()
+    return read, study().consent_sha256(read)
+
+
 def _closed(door: Door):
     asked = study().definition.recruiting
     back = asked.back(asked.turned_away, session.get("recruit", {}))
-    return render_template("questionnaire/door.html", message=door.value, back=back), 403
+    return render_template("questionnaire/door.html", message=gettext(door.value), back=back), 403
 
 
 def _back(participant: Participant) -> str:
@@ -159,7 +178,7 @@ def rate():
     levels = study().definition.familiarity.levels
     value = _integer("familiarity", levels[0], levels[-1])
     if value not in levels:
-        flash("Please choose one of the levels.")
+        flash(gettext("Please choose one of the levels."))
         return redirect(url_for(".familiarity"), 303)
     with database().write() as db:
         participant = _participant(db, lock=True)
@@ -171,7 +190,7 @@ def rate():
 
 @blueprint.get("/before")
 def before():
-    return _own(study().definition.before)
+    return _own("before")
 
 
 @blueprint.post("/before")
@@ -211,7 +230,7 @@ def keep_screen():
 
 @blueprint.get("/after")
 def after():
-    return _own(study().definition.after)
+    return _own("after")
 
 
 @blueprint.post("/after")
@@ -219,15 +238,15 @@ def state_after():
     return _state("after", study().definition.after)
 
 
-def _own(asks: tuple[Ask, ...]):
-    """The page of questions of the study's own."""
+def _own(page: str):
+    """The page of questions of the study's own, `before` or `after` the pairs."""
     with database().read() as db:
         participant = _participant(db)
         if redirection := _redirect_to_due(participant):
             return redirection
         return render_template(
             "questionnaire/own.html",
-            asks=asks,
+            asks=getattr(study().in_language(language.current()), page),
             given=session.pop("given", {}),
             upcoming=_of(flow.upcoming(db, participant, PRELOADED_QUESTIONS)),
         )
@@ -237,7 +256,7 @@ def _state(page: str, asks: tuple[Ask, ...]):
     """Take the answers of that page, all of them or none."""
     values = {ask.name: ask.value(request.form.get(ask.name, "")) for ask in asks}
     if None in values.values():
-        flash("Please answer the questions that are not marked as optional.")
+        flash(gettext("Please answer the questions that are not marked as optional."))
         session["given"] = {ask.name: request.form.get(ask.name, "")[:200] for ask in asks}
         return redirect(url_for(f".{page}"), 303)
     with database().write() as db:
@@ -258,12 +277,12 @@ def question():
         trial, *following = flow.upcoming(db, participant, 1 + PRELOADED_QUESTIONS)
     if request.args.get("rested") == str(participant.answered):
         session["rested"] = participant.answered
-    pages = study().definition.pages
+    asked = study().in_language(language.current())
     if session.get("rested") != participant.answered and _pauses(participant.answered):
         return render_template(
             "questionnaire/pause.html",
             participant=participant,
-            paragraphs=pages.instructions.split("\n\n") if not participant.answered else [],
+            paragraphs=asked.pages.instructions.split("\n\n") if not participant.answered else [],
             upcoming=_of([trial, *following]),
         )
     shown = flow.Shown.again(flow.Shown.of_cookie(session.get("shown")), trial)
@@ -276,7 +295,7 @@ def question():
         images=_images(trial),
         upcoming=_of(following),
         measured=["view", *_MEASURED],
-        reason=study().definition.reason if _asks_reason(participant, trial.order) else None,
+        reason=asked.reason if _asks_reason(participant, trial.order) else None,
     )
 
 
@@ -284,17 +303,18 @@ def question():
 def answer():
     trial, value = _integer("trial", 1, 2**31 - 1), _integer("answer", -2, 2)
     if trial is None:
-        abort(400, "The form did not say which question it answers. Reload the page.")
+        abort(400, gettext("The form did not say which question it answers. Reload the page."))
     if value not in (level.value for level in study().definition.scale):
         if wants_json():
-            abort(400, "The form held no answer of the study's scale.")
-        flash("Please choose one of the answers.")
+            abort(400, gettext("The form held no answer of the study's scale."))
+        flash(gettext("Please choose one of the answers."))
         return redirect(url_for(".question"), 303)
     given = Answer(
         value=value,
         image_left_sha256=request.form.get("image_left", ""),
         image_right_sha256=request.form.get("image_right", ""),
         view=_view(),
+        language=language.current(),
         reason_ticks=_ticks(),
         reason_text=request.form.get("reason_text", "").strip()[:LONGEST_TEXT] or None,
         **{
@@ -303,12 +323,17 @@ def answer():
         },
     )
     if given.view == UNSCRIPTED and study().definition.viewer.scripts == REQUIRED:
-        abort(400, "This study shows images by JavaScript, which is switched off or was kept away.")
+        abort(
+            400,
+            gettext(
+                "This study shows images by JavaScript, which is switched off or was kept away."
+            ),
+        )
     shown = flow.Shown.of_cookie(session.get("shown"))
     visit, bound = session.get("visit", ""), not simulated()
     result = flow.answer(database(), study(), visit, trial, given, shown, bound=bound)
     if result is None:
-        message = "This browser has not begun the questionnaire, or lost its cookies."
+        message = gettext("This browser has not begun the questionnaire, or lost its cookies.")
         if wants_json():
             return jsonify(error=message, lost=True), 400
         abort(400, message)
@@ -322,9 +347,9 @@ def answer():
     if wants_json():
         return jsonify(outcome=outcome.value, next=url_for(place)), 200 if kept else 409
     if outcome is Outcome.REFUSED:
-        flash("That question was answered already; the first answer was kept.")
+        flash(gettext("That question was answered already; the first answer was kept."))
     elif outcome is Outcome.STALE:
-        flash("That was not the current question; nothing was changed. Please go on here.")
+        flash(gettext("That was not the current question; nothing was changed. Please go on here."))
     return redirect(url_for(place), 303)
 
 
@@ -355,20 +380,20 @@ def withdraw():
 def withdraw_now():
     """Withdraw this browser's participant, or the one who was given a withdrawal key."""
     if request.form.get("confirm") != "yes":
-        flash("Nothing was withdrawn. Please tick the box if you want to withdraw.")
+        flash(gettext("Nothing was withdrawn. Please tick the box if you want to withdraw."))
         return redirect(url_for(".withdraw"), 303)
     with database().write() as db:
         if "code" in request.form:
             if not _code_attempts.allow(request.remote_addr):
-                abort(429, "Too many keys were tried. Wait five minutes and try again.")
+                abort(429, gettext("Too many keys were tried. Wait five minutes and try again."))
             participant = flow.find_by_key(db, request.form["code"])
             if participant is None:
-                flash("No participant was given this key. Please check it.")
+                flash(gettext("No participant was given this key. Please check it."))
                 return redirect(url_for(".withdraw"), 303)
             own = _participant(db)
             if own is not None and own.id != participant.id:  # whose browser this is goes on
                 flow.withdraw(db, participant)
-                flash("The answers that belong to this key were withdrawn. Yours go on.")
+                flash(gettext("The answers that belong to this key were withdrawn. Yours go on."))
                 return redirect(url_for(_place(own)), 303)
             session["visit"] = participant.visit
         elif (participant := _participant(db, lock=True)) is None:
@@ -393,18 +418,23 @@ def resume(code: str = ""):
 @blueprint.post("/resume/")
 def resume_now():
     if not _code_attempts.allow(request.remote_addr):
-        abort(429, "Too many codes were tried. Wait five minutes and try again.")
+        abort(429, gettext("Too many codes were tried. Wait five minutes and try again."))
     with database().read() as db:
         participant = flow.find_by_resume_code(db, request.form.get("resume", ""))
         own = _participant(db)
         if participant is None:
-            flash("Nobody was given this code. Please check it.")
+            flash(gettext("Nobody was given this code. Please check it."))
             return redirect(url_for(".resume"), 303)
         if own is not None and own.id != participant.id and _place(own) in _UNFINISHED:
-            flash("This browser is in the middle of another person's questions; they go on here.")
+            flash(
+                gettext(
+                    "This browser is in the middle of another person's questions; they go on here."
+                )
+            )
             return redirect(url_for(_place(own)), 303)
         session["visit"] = participant.visit
         session.permanent = True
+        session.setdefault("language", participant.consent_language)
         participant = _participant(db)
     _code_attempts.forget(request.remote_addr)
     return redirect(url_for(_place(participant)), 303)
@@ -414,7 +444,7 @@ def resume_now():
 def another():
     """Let another person begin in this browser, where the study's people share one."""
     if not study().definition.participants.shared_device:
-        abort(403, "In this study one browser is for one person.")
+        abort(403, gettext("In this study one browser is for one person."))
     session.pop("visit", None)
     return redirect(url_for(".welcome"), 303)
 

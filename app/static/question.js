@@ -16,7 +16,7 @@ begin();
 
 async function begin() {
   const page = document.querySelector("main[data-trial]");
-  const form = page.querySelector("form"), scale = page.querySelector("fieldset");
+  const form = page.querySelector("form.answer"), scale = page.querySelector("fieldset");
   words = JSON.parse(page.dataset.words);
   scale.disabled = true;
   viewer = null;
@@ -120,7 +120,7 @@ async function insist(page, message, url, options) {
 }
 
 function onKey(event) {
-  const form = document.querySelector("main[data-trial] form");
+  const form = document.querySelector("main[data-trial] form.answer");
   if (!form || !viewer || event.ctrlKey || event.altKey || event.metaKey || event.repeat && !event.key.startsWith("Arrow")) return;
   const options = [...form.querySelectorAll("input[type=radio]")], keys = !stored(KEYS_OFF);
   if (options.some((option) => option.matches(":disabled")) || event.target.matches?.("input[type=range], textarea")) return;

@@ -635,3 +635,47 @@ def test_axe_finds_nothing_on_the_pages_of_a_participant(tmp_path, write_study, 
             page.goto(f"{address}{path}")
             check()
     assert len(set(seen)) == 9
+
+
+def test_a_phone_is_asked_in_chinese_and_the_language_can_be_changed(
+    chromium, tmp_path, write_study
+):
+    """Texts, not pixels: a machine without Chinese fonts draws boxes."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    words = {"question": {"text": "哪张更真实？", "left_label": "甲", "right_label": "乙"}}
+    study = {
+        "languages": ["en", "zh"],
+        "question": {"text": "Which is more real?", "left_label": "A", "right_label": "B"},
+        "text": {"zh": {"title": "哪一个？", **words}},
+    }
+    screen = {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 3}
+    with (
+        running(create_app(write_study(tmp_path / "study", **study))) as address,
+        chromium.new_context(**screen, locale="zh-CN", has_touch=True, is_mobile=True) as context,
+    ):
+        page = context.new_page()
+        page.goto(address)
+        expect(page.locator("html")).to_have_attribute("lang", "zh-Hans")
+        expect(page.locator("h1")).to_have_text("哪一个？")
+        page.check("[name=consent]")
+        page.click("button:text('开始')")
+        page.get_by_label("有些熟悉").check()
+        page.click("button:text('继续')")
+        page.wait_for_selector("main.shown fieldset:enabled")
+        expect(page.locator("h1")).to_have_text(re.compile("问题 1"))
+        expect(page.locator("figcaption").first).to_have_text("甲")
+        assert page.locator("canvas").first.get_attribute("aria-label") == "图像 甲"
+        context.set_offline(True)
+        page.get_by_label("看不出差别").check()
+        page.click("button:text('确认')")
+        expect(page.locator(".status")).to_have_text("尚未保存，正在重试……")
+        context.set_offline(False)
+        expect(page.locator("h1")).to_have_text(re.compile("问题 2"))
+        page.wait_for_selector("main.shown fieldset:enabled")
+        page.click("summary:text('简体中文')")
+        assert Axe().run(page, options=RULES).response["violations"] == []
+        page.click("button:text('English')")
+        shown(page, 2)
+        expect(page.locator("html")).to_have_attribute("lang", "en")
+        expect(page.locator("legend")).to_have_text("Which is more real?")

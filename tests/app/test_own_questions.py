@@ -174,12 +174,13 @@ STORED = {
     "how you looked at each pair (views, zoom, how long)": "view beside_ms flicker_ms wipe_ms "
     "flips pixel_scale_largest",
     "how long the page was out of sight": "away_ms",
+    "the language of the pages": "language consent_language",
 }
 #: Numbers and codes that the server makes, what a researcher notes, what a recruiter's link says.
 OURS = (
     "id participant_id trial_id visit completion_code withdrawal_key resume_code pilot recruit "
     "recruit_id "
-    "screen excluded_at excluded_because"
+    "screen excluded_at excluded_because consent_sha256"
 )
 OWN = "name value"  # of the study's own questions
 
