@@ -10,6 +10,7 @@ VERBS = {
     "techniques": "app.commands.techniques",
     "compare": "app.commands.compare",
     "build": "app.commands.build",
+    "study": "app.commands.study",
     "strip": "app.commands.strip",
     "power": "app.commands.power",
     "serve": "app.commands.serve",

@@ -29,6 +29,14 @@ RECORDED = (
 )
 
 
+def minutes(definition: Definition) -> tuple[int, int]:
+    """How many minutes most people need, from and to."""
+    low, high = (
+        max(1, round(definition.questions * seconds / 60)) for seconds in SECONDS_A_QUESTION
+    )
+    return low, high
+
+
 def box_name(image: Image) -> str:
     """The pixels of an image's region of interest, as in its address."""
     return "-".join(map(str, image.box))
@@ -123,10 +131,9 @@ class Study:
         in.
         """
         words = catalogue(language)
-        questions = self.definition.questions
-        low, high = (max(1, round(questions * seconds / 60)) for seconds in SECONDS_A_QUESTION)
+        low, high = minutes(self.definition)
         filled = {
-            "questions": str(questions),
+            "questions": str(self.definition.questions),
             "minutes": str(low)
             if low == high
             else words.gettext("%(low)s to %(high)s") % {"low": low, "high": high},

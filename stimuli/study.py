@@ -395,7 +395,7 @@ def read_study(
     ready-made. display: of a study that says nothing of it.
     """
     languages = read_languages(table)
-    default = _defaults(languages[0], rendered=render is not None)
+    default = default_wording(languages[0], rendered=render is not None)
     wording = Table({**default, **table.value}, table.source, table.key)
     techniques = table.tables("techniques", least=2)
     factors = _factors(table, rendered=render is not None)
@@ -533,7 +533,7 @@ def _texts(table: Table, study: Study, rendered: bool) -> dict[str, dict]:
     """
     defaults = {}
     for language in study.languages[1:]:
-        wording = _defaults(language, rendered)
+        wording = default_wording(language, rendered)
         texts = {
             "consent": wording["consent"],
             "question": wording["question"],
@@ -556,7 +556,7 @@ def _consent(table: Table) -> str:
     return text
 
 
-def _defaults(language: str, rendered: bool) -> dict:
+def default_wording(language: str, rendered: bool) -> dict:
     """The thesis's wording in a language; ready-made images have a consent of their own."""
     thesis = _thesis()
     wording = {key: thesis[key] for key in _WORDING}

@@ -91,6 +91,7 @@ def test_imports(path):
             | ({"renderer", "stimuli.scenes"} if relative.stem == "render" else set())
             | ({"renderer.scene"} if relative.stem == "harmonics" else set())
             | ({"renderer"} if relative.stem == "techniques" else set())
+            | ({"stimuli.folder"} if relative.stem == "study" else set())
         )
         allowed |= (
             {"renderer.errors", "renderer.caches", "renderer.optics"}

@@ -10,15 +10,22 @@ import pytest
 from app import cli
 
 VERBS = {name: cli.cli.get_command(None, name) for name in cli.VERBS}
+#: With those of verbs that have some of their own, such as "study new".
+COMMANDS = VERBS | {
+    f"{name} {sub}": command
+    for name, group in VERBS.items()
+    if isinstance(group, click.Group)
+    for sub, command in group.commands.items()
+}
 
 
 def test_verbs():
     assert set(VERBS) >= {"render", "build", "power", "serve", "simulate", "analyse"}
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", COMMANDS)
 def test_every_option_has_help(verb):
-    command = VERBS[verb]
+    command = COMMANDS[verb]
     assert command.help and command.help.rstrip().endswith(".")
     for parameter in command.params:
         if isinstance(parameter, click.Option):
@@ -29,9 +36,9 @@ def test_every_option_has_help(verb):
             assert parameter.make_metavar(click.Context(command)).strip("[].") in command.help
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", COMMANDS)
 def test_help(run, verb):
-    code, out, err = run(verb, "--help")
+    code, out, err = run(*verb.split(), "--help")
     assert code == 0 and not err
     assert out.startswith(f"Usage: subdermal {verb} ")
 
