@@ -52,6 +52,9 @@ def create_app(
     app.extensions["newcomers"] = (
         security.Limiter(enrolments, 600) if enrolments and not simulated else None
     )
+    # guesses, counted for this study in this process
+    app.extensions["code_attempts"] = security.Limiter(attempts=10, window_s=300)
+    app.extensions["logins"] = security.Limiter(attempts=5, window_s=300)
     app.config.update(HOSTS=tuple(trusted_hosts), METRICS_TOKEN=metrics_token)
     security.init(app)
     web.init(app)

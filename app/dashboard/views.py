@@ -26,11 +26,10 @@ from sqlalchemy.orm import Session
 from app import export, password, recruiting
 from app.dashboard import live
 from app.models import LogEntry, Participant, plain_code
-from app.security import REPORT_POLICY, Limiter
+from app.security import REPORT_POLICY
 from app.web import database, simulated, study, wants_json
 
 blueprint = Blueprint("dashboard", __name__, url_prefix="/dashboard")
-_logins = Limiter(attempts=5, window_s=300)
 #: Of the log, on the page; log.csv has all.
 LATEST_ENTRIES = 10
 
@@ -55,14 +54,14 @@ def login():
     # The right password always lets in, whoever has been guessing: its 79 bits need no lock
     # against guesses, which are only told to stop.
     if not password.log_in(request.form.get("password", "")):
-        if not _logins.allow(request.remote_addr):
+        if not current_app.extensions["logins"].allow(request.remote_addr):
             abort(429, "Too many passwords were tried. Wait five minutes and try again.")
         flash(
             "This is not the password. It was shown when the server first started; "
             "`subdermal serve --reset-password` sets a new one."
         )
         return render_template("dashboard/login.html"), 401
-    _logins.forget(request.remote_addr)
+    current_app.extensions["logins"].forget(request.remote_addr)
     return redirect(url_for(".index"), 303)
 
 

@@ -29,14 +29,12 @@ from app.models import Participant
 from app.questionnaire import flow, screen, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
 from app.recruiting import Door
-from app.security import Limiter
 from app.web import database, simulated, study, wants_json
 from stimuli.asking import LONGEST_TEXT, Ask
 from stimuli.manifest import Image
 from stimuli.viewing import REQUIRED
 
 blueprint = Blueprint("questionnaire", __name__)
-_code_attempts = Limiter(attempts=10, window_s=300)
 
 _LARGEST_RT_MS = 2**31 - 1
 _LARGEST_SIZE = 100_000
@@ -384,7 +382,7 @@ def withdraw_now():
         return redirect(url_for(".withdraw"), 303)
     with database().write() as db:
         if "code" in request.form:
-            if not _code_attempts.allow(request.remote_addr):
+            if not current_app.extensions["code_attempts"].allow(request.remote_addr):
                 abort(429, gettext("Too many keys were tried. Wait five minutes and try again."))
             participant = flow.find_by_key(db, request.form["code"])
             if participant is None:
@@ -417,7 +415,7 @@ def resume(code: str = ""):
 
 @blueprint.post("/resume/")
 def resume_now():
-    if not _code_attempts.allow(request.remote_addr):
+    if not current_app.extensions["code_attempts"].allow(request.remote_addr):
         abort(429, gettext("Too many codes were tried. Wait five minutes and try again."))
     with database().read() as db:
         participant = flow.find_by_resume_code(db, request.form.get("resume", ""))
@@ -436,7 +434,7 @@ def resume_now():
         session.permanent = True
         session.setdefault("language", participant.consent_language)
         participant = _participant(db)
-    _code_attempts.forget(request.remote_addr)
+    current_app.extensions["code_attempts"].forget(request.remote_addr)
     return redirect(url_for(_place(participant)), 303)
 
 

@@ -246,17 +246,13 @@ def test_without_a_password_nobody_gets_in(person):
     assert somebody.send("password", password="None").status_code == 401
 
 
-def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(
-    person, experimenter, app, monkeypatch
-):
+def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(person, experimenter, app):
     assert experimenter.get("/dashboard/").status_code == 200
     secret = password.reset(app.extensions["database"])
     experimenter.get("/dashboard/")
     assert experimenter.path == "/dashboard/login"
 
-    from app.dashboard import views
-
-    monkeypatch.setattr(views, "_logins", Limiter(attempts=5, window_s=300))
+    app.extensions["logins"] = Limiter(attempts=5, window_s=300)
     somebody = person()
     somebody.get("/dashboard/login")
     codes = [somebody.send("password", password="wrong").status_code for _ in range(5)]
