@@ -50,13 +50,13 @@ class Slabs:
         return float(d[min(np.flatnonzero(seen)[-1] + 1, len(d) - 1)]) if seen.any() else d[0]
 
 
-def fitted(fit: DipoleFit, thinnest: float, blur_mm: float = 0.0) -> Slabs:
+def fitted(fit: DipoleFit, thinnest: float, nearest_mm: tuple[float, float] = (0.0, 0.0)) -> Slabs:
     """Slabs of the medium that a dipole was fitted to: its sources and their images.
 
     z_b = (z_v - z_r) / 2 = 2 A D is that of both faces, z_r is the mean free path; an endless slab
     is the dipole itself. thinnest: in mean free paths, above 1, below which the first source would
-    lie under the far face; blur_mm: of all depths of sources, by which what they send along a face
-    is spread wider; totals stay.
+    lie under the far face; nearest_mm: no source is seen as nearer to the lit face, and to the far
+    one, than that, so that what it sends is spread wider along the face; totals stay.
     """
     l, z_b, sigma = fit.real_mm, (fit.virtual_mm - fit.real_mm) / 2, fit.sigma_tr
     whole = 0.5 * (np.exp(-sigma * l) + np.exp(-sigma * fit.virtual_mm))
@@ -77,27 +77,28 @@ def fitted(fit: DipoleFit, thinnest: float, blur_mm: float = 0.0) -> Slabs:
         d, P = d[:, None], P[:, None]
         R, T = np.zeros((2, len(thickness_mm), len(r_mm), len(l)))
 
-        def source(z: np.ndarray) -> np.ndarray:
-            deeper = np.sign(z) * (np.abs(z) + blur_mm)
-            return np.exp(sigma * blur_mm) * pole(r, deeper, sigma)
+        def source(z: np.ndarray, more: np.ndarray) -> np.ndarray:
+            return np.exp(sigma * more) * pole(r, np.sign(z) * (np.abs(z) + more), sigma)
+
+        back, on = np.maximum(nearest_mm[0] - l, 0), np.maximum(nearest_mm[1] - (d - l), 0)
 
         for i in range(-IMAGES, IMAGES + 1):
             z_r, z_v = 2 * i * P + l, 2 * i * P - l - 2 * z_b
-            R += source(z_r) - source(z_v)
-            T += source(d - z_r) - source(d - z_v)
+            R += source(z_r, back) - source(z_v, back)
+            T += source(d - z_r, on) - source(d - z_v, on)
         return np.maximum(R, 0) / whole, np.maximum(T, 0) / whole
 
     return Slabs(totals, densities, thinnest * l)
 
 
-def layered(stack: Stack, thinnest: float, blur_mm: float = 0.0) -> Slabs:
+def layered(stack: Stack, thinnest: float, nearest_mm: tuple[float, float] = (0.0, 0.0)) -> Slabs:
     """Slabs of a stack of layers, by their coefficients: the combined profiles of coatings and what
     lies below.
 
-    thinnest: of the last layer, in its mean free paths; blur_mm: as in `fitted`, of the last
-    layer's sigma_tr.
+    thinnest: of the last layer, in its mean free paths; nearest_mm: as in `fitted`, by the first
+    layer's mean free path and the last one's sigma_tr.
     """
-    last = stack.layers[-1].medium
+    first, last = stack.layers[0].medium, stack.layers[-1].medium
     endless = bool(np.isinf(stack.thickness_mm))
     coated = 2 * sum(layer.thickness_mm for layer in stack.layers[:-1])
     least = np.full(stack.channels, coated + thinnest * float(last.mfp.max()))
@@ -116,11 +117,14 @@ def layered(stack: Stack, thinnest: float, blur_mm: float = 0.0) -> Slabs:
         finest = min(one.finest_mm() for one in slabs)
 
         def spectra(k: np.ndarray) -> np.ndarray:
+            fall = np.sqrt(k**2 + last.sigma_tr**2) - last.sigma_tr
+            shape, columns = (len(k), stack.channels), []
             faces = [one.spectrum(k) for one in slabs]
-            wider = np.exp(-(np.sqrt(k**2 + last.sigma_tr**2) - last.sigma_tr) * blur_mm)
-            shape = (len(k), stack.channels)
-            columns = [np.broadcast_to(f.R * wider, shape) for f in faces]
-            columns += [np.broadcast_to(f.T * wider, shape) for f in faces]
+            wider = np.exp(-fall * np.maximum(nearest_mm[0] - first.mfp, 0))
+            columns += [np.broadcast_to(f.R * wider, shape) for f in faces]
+            for one, f in zip(slabs, faces, strict=True):
+                above = np.maximum(nearest_mm[1] - (one.thickness_mm - first.mfp), 0)
+                columns.append(np.broadcast_to(f.T * np.exp(-fall * above), shape))
             return np.concatenate(columns, axis=1)
 
         flat = hankel(spectra, np.asarray(r_mm, float), finest)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -48,6 +49,8 @@ class Camera(Parameters):
     @classmethod
     def read(cls, table: dict[str, Any], where: str) -> Camera:
         """A camera from a table: `framing` and `angle` by name first, then numbers over them."""
+        if not isinstance(table, Mapping):
+            raise InputError(f"{where} is {table!r:.60}; expected a table")
         table = dict(table)
         angle = table.pop("angle", None)
         named = table.get("framing")

@@ -13,6 +13,8 @@ from renderer.parameters import Parameters, parameter
 
 UNITS = ("mm", "cm", "m", "in")
 UP_AXES = ("y", "z")
+#: Of a knot's radius: its strands come within 0.554 of it.
+WIDEST_TUBE = 0.27
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,26 @@ class Sphere(Object):
 
 
 @dataclass(frozen=True)
+class Knot(Object):
+    """A tube in a trefoil knot about the z axis: thin parts before and behind each other."""
+
+    shape: ClassVar[str] = "knot"
+
+    radius_mm: float = parameter(
+        15.0, unit="mm from the axis to the tube's middle", low=0.01, high=1e4, source="the scene's"
+    )
+    tube_mm: float = parameter(3.8, unit="mm, radius", low=0.01, high=1e4, source="the scene's")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.tube_mm > WIDEST_TUBE * self.radius_mm:
+            raise InputError(
+                f"{self.where('tube_mm')} is {self.tube_mm:g}; expected at most "
+                f"{WIDEST_TUBE * self.radius_mm:.3g}: a thicker tube would meet itself"
+            )
+
+
+@dataclass(frozen=True)
 class Slab(Object):
     """A box of the given width, height and depth; its front faces +z."""
 
@@ -137,7 +159,7 @@ class Box(Object):
 
 
 SHAPES: dict[str, type[Object]] = {
-    kind.shape: kind for kind in (Person, Scan, Mesh, Sphere, Slab, Sheet, Box)
+    kind.shape: kind for kind in (Person, Scan, Mesh, Sphere, Knot, Slab, Sheet, Box)
 }
 
 

@@ -83,6 +83,35 @@ def sphere(radius_mm: float, rings: int = 96) -> Shape:
     return Shape(radius_mm * normals, normals, uvs, grid_faces(rings + 1, 2 * rings + 1))
 
 
+def knot(radius_mm: float, tube_mm: float, along: int = 360, around: int = 36) -> Shape:
+    """A tube in a trefoil knot, (2 + cos 3t) (cos 2t, sin 2t), sin 3t, whose middle reaches
+    radius_mm from the axis; its atlas is along and around.
+    """
+    t = np.linspace(0, 2 * np.pi, along + 1)
+    scale = radius_mm / 3
+
+    def middle(t: np.ndarray) -> np.ndarray:
+        wide = 2 + np.cos(3 * t)
+        return scale * np.column_stack([wide * np.cos(2 * t), wide * np.sin(2 * t), np.sin(3 * t)])
+
+    step = 1e-5
+    tangent = (middle(t + step) - middle(t - step)) / (2 * step)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    # away from the torus's ring: a frame that turns smoothly and closes
+    ring = 2 * scale * np.column_stack([np.cos(2 * t), np.sin(2 * t), 0 * t])
+    out = middle(t) - ring
+    out -= np.einsum("ki,ki->k", out, tangent)[:, None] * tangent
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    side = np.cross(tangent, out)
+    u, v = np.meshgrid(np.arange(along + 1) / along, np.arange(around + 1) / around, indexing="ij")
+    a = 2 * np.pi * v[..., None]
+    normals = np.cos(a) * out[:, None] + np.sin(a) * side[:, None]
+    positions = middle(t)[:, None] + tube_mm * normals
+    uvs = np.stack([u, v], axis=2).reshape(-1, 2)
+    faces = grid_faces(along + 1, around + 1)
+    return Shape(positions.reshape(-1, 3), normals.reshape(-1, 3), uvs, faces)
+
+
 _SIDES = (  # outward normal, direction of u, direction of v
     ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
     ((0, 0, -1), (-1, 0, 0), (0, 1, 0)),

@@ -119,7 +119,7 @@ class PointsTechnique(Technique):
         source="Rohat 2012, sec. 5.2.2: the middle, or near",
     )
     relaxation: int = parameter(
-        5, unit="rounds", low=0, high=500, source="Turk 1991; Rohat 2012, table 5.4: 10 to 100"
+        10, unit="rounds", low=0, high=500, source="Turk 1991; Rohat 2012, table 5.4: 10 to 100"
     )
     weights: str = parameter(
         "normalised", choices=("normalised", "published"), source="Rohat 2012, eq. 4.6: the sum"
@@ -214,7 +214,11 @@ class PointsTechnique(Technique):
             seen = body.from_lamp(light, self.spacing_mm, self.grid, self.jitter, *options)
             if seen is not None:
                 yield seen, k
-        yield body.over_surface(*over), "environment"
+        dark = not room.surroundings.mean().any()
+        if self.even == "baked":  # what surfaces send each other too
+            dark = not any(drawn.baked.light.any() for drawn in body.parts)
+        if not dark:
+            yield body.over_surface(*over), "environment"
 
     def _one(self, inputs: Inputs, room: Room, parts: tuple[Drawn, ...], sums: gl.Target) -> None:
         """Add one body's points to the sums."""

@@ -36,7 +36,8 @@ class SplatMultipole(PointsTechnique):
     faces; an endless part is `splat_dipole`. "layers": the multipole of the medium's own
     coefficients, and of coatings over it the combined profiles, as in the document. through: how
     much comes through, by those profiles, or as Monte Carlo of slabs of the medium has it, spread
-    as they say. thinnest: parts that are thinner count as that thick. depth: "face", the thickness
+    as they say. thinnest: parts that are thinner count as that thick. blur_through: as `blur`, of
+    what comes through, along the far face alone. depth: "face", the thickness
     below a point's face; "light", along the light, for the samples of lights alone. distance
     "along": T is looked up by the distance along the face, for which it is defined; "published": by
     the distance itself, which a thin part's T loses much of. medium_scale: all lengths of the
@@ -57,6 +58,7 @@ class SplatMultipole(PointsTechnique):
     thinnest: float = parameter(
         1.2, unit="mean free paths", low=1.01, high=64.0, source="Rohat 2012, sec. 5.1.2: 4"
     )
+    blur_through: float = parameter(1.0, unit="of the spacing", low=0.0, high=4.0, source="by eye")
     depth: str = parameter("face", choices=("face", "light"), source="Rohat 2012, fig. 5.7: light")
     distance: str = parameter(
         "along", choices=("along", "published"), source="Rohat 2012, eq. 5.2: published"
@@ -92,7 +94,9 @@ class SplatMultipole(PointsTechnique):
     def blur_mm(self, curve: Curve, spacing_mm: float) -> np.ndarray:
         return super().blur_mm(curve, spacing_mm / self.medium_scale)
 
-    def slabs(self, curve: Curve, medium: str | dict | None, blur_mm=0.0) -> tuple[Slabs, float]:
+    def slabs(
+        self, curve: Curve, medium: str | dict | None, nearest_mm=(0.0, 0.0)
+    ) -> tuple[Slabs, float]:
         """Slabs of the medium, and what the whole medium sends back in their unit (C,): 1, unless
         it is a sheet itself.
         """
@@ -108,10 +112,10 @@ class SplatMultipole(PointsTechnique):
                     f"{self.where('profiles')} is 'layers' for {medium!r:.60}, which is known as a "
                     "curve alone; expected a medium with coefficients, or 'fitted'"
                 )
-            made = slabs.layered(endless, self.thinnest, blur_mm)
+            made = slabs.layered(endless, self.thinnest, nearest_mm)
         else:
             of = media.simulated(endless) if sheet else curve
-            made = slabs.fitted(fits.dipole(of), self.thinnest, blur_mm)
+            made = slabs.fitted(fits.dipole(of), self.thinnest, nearest_mm)
         whole = made.totals(np.array([stack.thickness_mm]))[0][0] if sheet else 1.0
         return made, whole
 
@@ -132,7 +136,9 @@ def _tables(technique: SplatMultipole, curve: Curve, key: str | None, spacing_mm
     """The tables of a technique; they take up to some seconds."""
     medium = None if key is None else json.loads(key)
     scale = technique.medium_scale
-    made, whole = technique.slabs(curve, medium, technique.blur_mm(curve, spacing_mm))
+    shares = (technique.blur, technique.blur_through)
+    nearest = tuple(share * spacing_mm / scale for share in shares)
+    made, whole = technique.slabs(curve, medium, nearest)
     reach = technique.reach_mm(curve, spacing_mm)
     last = made.farthest(LEAST_THROUGH)
     d = np.geomspace(0.25 * float(made.least_mm.min()), last, ROWS)

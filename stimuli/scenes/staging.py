@@ -123,6 +123,8 @@ GENERATED_SMOOTH = 16
 def _generated(thing: objects.Object, material: Material) -> shapes.Shape:
     if isinstance(thing, objects.Sphere):
         return shapes.sphere(thing.radius_mm)
+    if isinstance(thing, objects.Knot):
+        return shapes.knot(thing.radius_mm, thing.tube_mm)
     if isinstance(thing, objects.Slab):
         return shapes.slab(thing.size_mm)
     if isinstance(thing, objects.Sheet):

@@ -1,9 +1,12 @@
 """Turk's relaxation: points that walk over a mesh, and spread evenly."""
 
 import numpy as np
+import pytest
 from scipy.spatial import cKDTree
 
+from renderer.errors import InputError
 from renderer.scene import shapes
+from renderer.scene.objects import WIDEST_TUBE, Knot
 from renderer.scene.relaxation import Mesh, relax
 from renderer.techniques.samples import spread
 
@@ -18,6 +21,29 @@ def test_every_triangle_of_a_closed_shape_has_its_neighbours():
     assert (mesh.beyond[whole] >= 0).all() and (~whole).sum() == 4 * 24
     for t in np.flatnonzero(whole)[:200]:
         assert all(t in mesh.beyond[other] for other in mesh.beyond[t])
+
+
+def test_a_knot_is_a_closed_tube_that_does_not_meet_itself():
+    """Its area and volume are those of a straight tube of its length (Pappus and Guldin)."""
+    tube = 11.0 * WIDEST_TUBE
+    shape = shapes.knot(11.0, tube)
+    mesh = Mesh(shape.positions, shape.faces)
+    assert (mesh.beyond >= 0).all()
+    t = np.linspace(0, 2 * np.pi, 4001)
+    wide = 2 + np.cos(3 * t)
+    middle = 11 / 3 * np.column_stack([wide * np.cos(2 * t), wide * np.sin(2 * t), np.sin(3 * t)])
+    length = np.linalg.norm(np.diff(middle, axis=0), axis=1).sum()
+    volume = np.einsum("ki,ki->", mesh.corners[:, 0], mesh.normals * mesh.areas[:, None]) / 3
+    assert np.isclose(mesh.areas.sum(), 2 * np.pi * tube * length, rtol=0.01)
+    assert np.isclose(volume, np.pi * tube**2 * length, rtol=0.02)
+    apart = np.linalg.norm(middle[::20, None] - middle[None, ::20], axis=-1)
+    along = np.abs(np.subtract.outer(np.arange(201), np.arange(201)))
+    far = np.minimum(along, 200 - along) > 40
+    assert apart[far].min() > 2 * tube
+    outward = np.einsum("ki,ki->k", mesh.normals, shape.normals[shape.faces[:, 0]])
+    assert outward.min() > 0.9
+    with pytest.raises(InputError, match="tube_mm is 3.5; expected at most 2.97"):
+        Knot(radius_mm=11.0, tube_mm=3.5)
 
 
 def test_a_walk_keeps_its_length_around_a_boxs_edges():

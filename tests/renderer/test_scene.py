@@ -79,6 +79,7 @@ def test_coatings_and_thickness_make_layers():
         ({"lights": {"key": {"radius": 1}}}, "scene.lights.key.radius is unknown; did you mean"),
         ({"lights": {"key": {"irradiance": [1, 2]}}}, "key.irradiance is (1, 2); expected 3 num"),
         ({"lights": {"key": {"direction": [0, 0, 0]}}}, "direction is (0, 0, 0); expected a"),
+        ({"camera": "near"}, "scene.camera is 'near'; expected a table"),
         ({"camera": {"framing": "far"}}, "scene.camera.framing is 'far'; expected one of close-up"),
         ({"camera": {"angle": "back"}}, "scene.camera.angle is 'back'; expected one of front"),
         ({"camera": {"angle": "front", "yaw_deg": 3}}, "has both angle, 'front', and yaw_deg, 3"),

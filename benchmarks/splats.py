@@ -1,0 +1,157 @@
+"""Splats: what a frame costs by their number, their size and the pixels they cover, beside the
+published frame rates as ratios; and how the relaxation of points grows.
+
+Rohat 2012, tables 6.1, 6.3, 6.6, 6.7, 6.8 (a Quadro 600, 512x512 pixels): only ratios can be
+compared, of the scattering alone, on software OpenGL. The models are not ours to ship: a knot of
+marble stands for them. A grid's cells outside of the object are not splatted, here as there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+
+import renderer
+from renderer.scene import shapes
+from renderer.scene.relaxation import Mesh, relax
+from renderer.techniques.samples import Body, spread
+from stimuli import scenes
+
+#: Frames a second, from the first row to the last.
+NUMBER = {"dipole": (62.1, 48.9, 38.9, 30.5, 25.4), "multipole": (40.1, 30.7, 24.1, 19.6, 15.2)}
+GRIDS = ((55, 38), (65, 45), (75, 52), (85, 60), (95, 67))
+SIZES = {1.0: 24.0, 0.8: 34.9, 0.6: 54.9, 0.4: 96.1}  # table 6.6, 75 x 32 splats, multipole
+EVEN = {1.0: 16.7, 0.8: 22.1, 0.6: 35.8, 0.4: 70.1}  # table 6.8, 5,789 splats, multipole
+FAR = {"very close": 16.5, "moderate": 28.8, "far": 78.2}  # table 6.7, 50 x 49 splats
+HEIGHTS = {"very close": 34.0, "moderate": 48.0, "far": 90.0}
+NUMBER_EVEN = (5789, 6947, 8105, 9263)
+FPS_EVEN = (16.7, 13.1, 11.1, 9.4)
+
+
+def knot(height_mm: float) -> dict:
+    """The scene: a knot of marble under a lamp."""
+    return {
+        "objects": {"knot": {"shape": "knot", "radius_mm": 13.0, "tube_mm": 3.4}},
+        "materials": {"knot": {"medium": "marble", "albedo": [0.83, 0.79, 0.75]}},
+        "lights": {"lamp": {"direction": [0.4, 0.5, 0.75], "irradiance": [3.0, 3.0, 3.0]}},
+        "environment": {"ambient": [0.0, 0.0, 0.0]},
+        "camera": {"framing": "knot", "height_mm": height_mm, "angle": "front"},
+    }
+
+
+def frame_of(height_mm: float, size: int):
+    """A renderer and its frame."""
+    graph = scenes.stage(scenes.read_scene(knot(height_mm))).graph
+    drawing = renderer.Renderer(graph, (size, size), 1, rays=1)
+    return drawing, drawing.frame()
+
+
+def spent(frame, techniques: dict, rounds: int) -> dict[str, float]:
+    """CPU seconds of each, medians of rounds in turn."""
+    return {name: np.median(s[:, 1]) for name, s in frame.time(techniques, rounds).items()}
+
+
+def table(title: str, rows: list[tuple[str, float, float]], note: str = "") -> None:
+    """Print CPU seconds of rows, and time over the first row's here and there."""
+    print(f"\n{title}{note}")
+    print(f"{'':<16}{'CPU s':>9}{'ratio':>9}{'published':>11}")
+    for name, seconds, fps in rows:
+        ratio, paper = seconds / rows[0][1], rows[0][2] / fps
+        print(f"{name:<16}{seconds:>9.2f}{ratio:>9.2f}{paper:>11.2f}", flush=True)
+
+
+def splat(kind: str, **parameters) -> renderer.Technique:
+    """A technique as the document has it, by a grid or by points over the surface."""
+    own = {"weights": "published", "blur": 0.0, "even": "harmonics", **parameters}
+    return renderer.make(f"splat_{kind}", own)
+
+
+def smaller(kind: str, scale: float, **parameters) -> renderer.Technique:
+    """As `splat`, with splats of a share of the radius: that which holds so much less light."""
+    from renderer.optics import fits, media
+
+    curve = media.curve("marble")
+    reach = scale * splat(kind).reach_mm(curve)
+    share = float(fits.dipole(curve).cdf(np.array([reach])).min())
+    low, high = 0.5, 0.9999
+    for _ in range(40):  # the radius is the largest channel's
+        share = 0.5 * (low + high)
+        got = splat(kind, share=share).reach_mm(curve)
+        low, high = (share, high) if got < reach else (low, share)
+    return splat(kind, share=share, **parameters)
+
+
+def frames(size: int, rounds: int) -> None:
+    """The tables of a frame's cost."""
+    drawing, frame = frame_of(34.0, size)
+    grid = {"samples": "lights"}
+    times = {}
+    for kind in NUMBER:
+        made = {f"{a} x {b}": splat(kind, grid=(a, b), **grid) for a, b in GRIDS}
+        times[kind] = spent(frame, made, rounds)
+        rows = [(n, s, fps) for (n, s), fps in zip(times[kind].items(), NUMBER[kind], strict=True)]
+        table(f"{kind}, number of splats (table 6.1)", rows)
+    ratio = np.median([times["multipole"][n] / times["dipole"][n] for n in times["dipole"]])
+    paper = np.median(np.array(NUMBER["dipole"]) / np.array(NUMBER["multipole"]))
+    print(f"\nmultipole over dipole: {ratio:.2f}; published {paper:.2f}")
+    made = {f"{s:g}": smaller("multipole", s, grid=(75, 32), **grid) for s in SIZES}
+    got = spent(frame, made, rounds)
+    rows = [(f"{s:g}", got[f"{s:g}"], fps) for s, fps in SIZES.items()]
+    table("splat size, share of the radius (table 6.6, 75 x 32)", rows)
+    area = Body(frame.inputs(None).room.surfaces, 0).mesh.areas.sum()
+    even = {
+        f"{s:g}": smaller("multipole", s, spacing_mm=float(np.sqrt(area / NUMBER_EVEN[0])))
+        for s in EVEN
+    }
+    got = spent(frame, even, rounds)
+    rows = [(f"{s:g}", got[f"{s:g}"], fps) for s, fps in EVEN.items()]
+    table("over the surface, splat size (table 6.8, 5,789 splats)", rows)
+    more = {str(n): splat("multipole", spacing_mm=float(np.sqrt(area / n))) for n in NUMBER_EVEN}
+    got = spent(frame, more, rounds)
+    rows = [(n, s, fps) for (n, s), fps in zip(got.items(), FPS_EVEN, strict=True)]
+    table("over the surface, number of splats (table 6.8)", rows)
+    frame.close()
+    drawing.close()
+    rows, covered = [], []
+    for name, fps in FAR.items():
+        drawing, frame = frame_of(HEIGHTS[name], size)
+        covered.append(int((frame.surface.textures[3].read()[..., 0] > 0).sum()))
+        one = {name: splat("multipole", grid=(50, 49), **grid)}
+        rows.append((name, spent(frame, one, rounds)[name], fps))
+        frame.close()
+        drawing.close()
+    note = "; pixels covered: " + ", ".join(f"{n:,}" for n in covered)
+    table("distance (table 6.7, 50 x 49)", rows, note)
+
+
+def relaxation() -> None:
+    """How the relaxation of points grows, 10 rounds on a ball of 100,000 triangles."""
+    ball = shapes.sphere(40.0, 158)
+    start = time.process_time()
+    mesh = Mesh(ball.positions, ball.faces)
+    print(
+        f"\nrelaxation, 10 rounds on {len(ball.faces):,} triangles (their neighbours: "
+        f"{time.process_time() - start:.2f} s CPU, once); published: 10,000 points 4 s (table 5.4)"
+    )
+    print(f"{'points':>10}{'CPU s':>9}{'per point, us':>15}")
+    for count in (1000, 3000, 10_000, 30_000, 100_000):
+        triangles, weights = spread(mesh.areas, count, np.random.default_rng(0))
+        start = time.process_time()
+        relax(mesh, triangles, weights, 10)
+        seconds = time.process_time() - start
+        print(f"{count:>10,}{seconds:>9.2f}{1e6 * seconds / count:>15.0f}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--size", type=int, default=512, help="pixels of a side")
+    parser.add_argument("--rounds", type=int, default=3, help="of each, medians")
+    given = parser.parse_args()
+    relaxation()
+    frames(given.size, given.rounds)
+
+
+if __name__ == "__main__":
+    main()
