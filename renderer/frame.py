@@ -17,6 +17,7 @@ from renderer.passes.composite import composite
 from renderer.passes.given import draw_given
 from renderer.passes.pieces import Piece, pieces
 from renderer.passes.surfaces import FORMATS
+from renderer.scene.lights import PointLight
 from renderer.scene.picture import Picture
 from renderer.scene.view import View
 from renderer.techniques.base import Inputs, Room, Technique
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Of a reach: half a pixel for each of a technique's passes, and one of a derivative.
 ROUNDING_PX = 8
+#: Of linear R, G, B: the weights of composite.frag.
+LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 
 
 @dataclass(frozen=True)
@@ -271,8 +274,12 @@ class Frame:
         self, scattered: gl.Texture, technique: Technique, piece: Piece | None = None
     ) -> np.ndarray:
         """The image (H, W, 3) uint8 sRGB of light that a technique has scattered, or a piece."""
-        r = self.renderer
-        return composite(
+        r, bare, dimmed = self.renderer, None, None
+        if technique.specular_white is not None:
+            bare = self._bare_specular() if r.hair else None
+            specular = bare.textures[1] if bare else self.surface.textures[1]
+            dimmed = (specular, technique.specular_white * self._strongest())
+        image = composite(
             r.context,
             r.program,
             scattered,
@@ -284,7 +291,33 @@ class Frame:
             technique.texturing,
             technique.diffuse == "conserving",
             piece,
+            dimmed,
         )
+        if bare:
+            bare.delete()
+        return image
+
+    def _bare_specular(self) -> gl.Target:
+        """Surfaces once more: textures[1] is specular light without hair. The caller frees it."""
+        target = gl.Target(self.width, self.height, [GL.GL_RGBA16F] * 2, depth=self.surface)
+        target.bind(clear=(0.0, 0.0, 0.0, 0.0))
+        target.bind(depth_test=True)  # the depth is there already
+        r = self.renderer
+        r.surfaces.draw(r.program, r.lamps, r.surroundings, self._shared)
+        return target
+
+    def _strongest(self) -> float:
+        """The luminance of the strongest lamp's irradiance at the subject; of the environment's on
+        a sphere where there is no lamp.
+        """
+        shining = [0.0]
+        for light in self.renderer.lamps.lights:
+            falloff = 1.0
+            if isinstance(light, PointLight):
+                falloff = light.falloff(np.linalg.norm(self.renderer.subject - light.place))
+            shining.append(float(falloff * LUMINANCE @ light.irradiance))
+        ambient = np.pi * float(LUMINANCE @ self.renderer.surroundings.mean())
+        return max(max(shining) or ambient, 1e-9)
 
     def time(self, techniques: dict[str, Technique], rounds: int) -> dict[str, np.ndarray]:
         """Seconds that scattering alone takes: name -> (rounds, 2) of wall and CPU time.

@@ -24,6 +24,9 @@ from renderer.optics.multipole import Multipole
 
 MODELS = ("none", "slab", "jimenez", "burley", "multipole", "beer")
 EXPONENTS = ("exact", "published")
+#: How a thickness is taken from a lamp's depth map, see Translucency; passes/transmission.glsl has
+#: them by their places.
+THICKNESS = ("corrected", "along", "entry")
 PHOTONS = 20_000  # a channel and thickness: T of 0.1 within 0.002
 SEED = 20240602
 THICKNESSES = 16  # of slabs, a channel
@@ -37,13 +40,17 @@ class Translucency:
 
     model: one of MODELS but "none"; exponent: one of EXPONENTS, of "jimenez"; wrap: added to the
     cosine of the light on the far face; thickness_scale: mm of the medium per mm of thickness in a
-    lamp's depth map.
+    lamp's depth map. thickness: "along" the lamp's ray (Jimenez et al. 2010); "corrected", across
+    the part where its far face looks away from the point that is seen, along the ray where both
+    look the same way (d'Eon and Luebke 2007, ch. 14.5.3); "entry", from that point to the plane in
+    which the light enters, which it meets at that plane's own angle and not at the point's.
     """
 
     model: str = "slab"
     exponent: str = "exact"
     wrap: float = 0.0
     thickness_scale: float = 1.0
+    thickness: str = "corrected"
 
 
 @dataclass(frozen=True, eq=False)

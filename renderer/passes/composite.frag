@@ -11,6 +11,8 @@ uniform mat3 rays;                           // normalised device coordinates to
 uniform vec3 backdrop_centre; uniform vec3 backdrop_edge;
 uniform float aspect;
 uniform int scattered_row;  // of what is drawn, in the scattered light
+uniform sampler2D bare;     // specular light without hair over it
+uniform float white;        // luminance of scattered light at which it is whole; 0: it always is
 out vec4 colour;
 
 // Narkowicz 2016, "ACES filmic tone mapping curve".
@@ -39,6 +41,11 @@ void main() {
         vec3 own = max(face.rgb, 0.0);
         vec3 left = texturing == 0.0 ? own : pow(max(own, 1e-6), vec3(1.0 - texturing));
         vec4 light = texelFetch(scattered, ivec2(gl_FragCoord.xy) + ivec2(0, scattered_row), 0);
+        if (white > 0.0 && light.a > 0.5) {
+            vec3 blurred = light.rgb / (texturing == 0.0 ? vec3(1.0) : pow(max(own, 1e-6), vec3(texturing)));
+            float share = clamp(dot(blurred, vec3(0.2125, 0.7154, 0.0721)) / white, 0.0, 1.0);
+            over.rgb -= (1.0 - share) * (1.0 - over.a) * texelFetch(bare, at, 0).rgb;
+        }
         radiance = (light.a > 0.5 ? left : own) * mix(1.0, face.a, conserving) * light.rgb / PI;
     }
     radiance = radiance * (1.0 - over.a) + over.rgb;

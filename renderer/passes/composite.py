@@ -26,17 +26,22 @@ def composite(
     texturing: float = 0.0,
     conserving: bool = False,
     piece: Piece | None = None,
+    dimmed: tuple[gl.Texture, float] | None = None,
 ) -> np.ndarray:
     """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers, or the rows of
     it that are right in a piece.
 
     texturing: the power of the albedo that scattered light has already been multiplied by;
-    conserving: the face holds back what it reflects inside.
+    conserving: the face holds back what it reflects inside; dimmed: specular light without hair and
+    the luminance of scattered light at which it is whole, None where it always is.
     """
     width, height = surface.width, surface.height
     piece = piece or Piece(0, height, 0, height)
     _, specular, albedo, depths = surface.textures
+    bare, white = dimmed or (specular, 0.0)
     programs_uniforms = {
+        "bare": bare,
+        "white": white,
         "scattered": scattered,
         "scattered_row": piece.low - piece.first,
         "image_size": (width, height),

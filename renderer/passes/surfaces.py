@@ -16,7 +16,7 @@ from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.optics import media, surface
 from renderer.optics.curve import Curve
-from renderer.optics.transmittance import TABLE, Translucency, curve_of
+from renderer.optics.transmittance import TABLE, THICKNESS, Translucency, curve_of
 from renderer.passes.bake import Baked, bake, body
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
@@ -195,6 +195,7 @@ class Surfaces:
                 "transmittance": self.face,
                 "transmittance_reach": 0.0,
                 "thickness_scale": 0.0,
+                "transmission_thickness": 0,
                 "transmission_wrap": 0.0,
             }
         key = (drawn.id, translucency.model, translucency.exponent)
@@ -211,6 +212,7 @@ class Surfaces:
             "transmittance_reach": reach_mm,
             "thickness_scale": translucency.thickness_scale,
             "transmission_wrap": translucency.wrap,
+            "transmission_thickness": THICKNESS.index(translucency.thickness),
         }
 
     def _material(self, drawn: Drawn) -> dict:

@@ -15,7 +15,7 @@ from renderer.parameters import Parameters, parameter, weights
 #: What a head's masks say, in the order of their columns: how much of each, in [0, 1].
 MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
 #: A material's maps, image files: albedo in sRGB, normals in tangent space, the others grey.
-MAPS = ("albedo_map", "normal_map", "roughness_map", "height_map", "specular_map")
+MAPS = ("albedo_map", "normal_map", "roughness_map", "height_map", "specular_map", "kernel_map")
 #: What of procedural skin can lie over an albedo map.
 LAYERS = ("relief", "freckles", "moles", "mottling", "hair", "oil")
 _SHARE = {"low": 0.0, "high": 1.0}
@@ -33,7 +33,8 @@ class Material(Parameters):
     layers above it, outermost first, each a table with `medium` and `thickness_mm`. albedo is
     linear, the share of diffuse light that comes back. Maps are image files over the surface's
     texture coordinates (a scan brings its own): MAPS says which. height_map: white stands height_mm
-    above black; specular_map: of `specular`.
+    above black; specular_map: of `specular`; kernel_map: how large an artist wants the filter of
+    techniques that ask for it (gosselin).
     """
 
     kind: ClassVar[str] = "plain"
@@ -59,6 +60,7 @@ class Material(Parameters):
     roughness_map: str = ""
     height_map: str = ""
     specular_map: str = ""
+    kernel_map: str = ""
     height_mm: float = parameter(
         1.0, unit="mm from black to white", low=-1000.0, high=1000.0, source="the map's own"
     )

@@ -10,7 +10,7 @@ import numpy as np
 from renderer.errors import InputError
 from renderer.optics.curve import Curve, edge_error
 from renderer.optics.surface import DIFFUSE
-from renderer.optics.transmittance import EXPONENTS, MODELS, Translucency
+from renderer.optics.transmittance import EXPONENTS, MODELS, THICKNESS, Translucency
 from renderer.parameters import Parameters, parameter
 
 if TYPE_CHECKING:
@@ -101,7 +101,8 @@ class Technique(Parameters):
 
     translucency: the transmittance of thin parts by which light that comes through them is reckoned
     (renderer.optics.transmittance); it is added before scattering (Jimenez et al. 2010).
-    translucency_exponent, translucency_wrap and thickness_scale are its details. texturing: the
+    translucency_exponent, translucency_thickness, translucency_wrap and thickness_scale are its
+    details. texturing: the
     share of the albedo's exponent that is applied before scattering: 0 post-scatter, 1 pre-scatter,
     0.5 both; each technique's default is its authors'. diffuse: how light passes the rough face on
     its way in and out. `measures_contrast`: it writes contrast. Kernels are fitted to the medium's
@@ -120,6 +121,11 @@ class Technique(Parameters):
     )
     translucency_exponent: str = parameter(
         "exact", choices=EXPONENTS, source="Jimenez et al. 2010, eq. 3: published, exp(-s^2 / v)"
+    )
+    translucency_thickness: str = parameter(
+        "corrected",
+        choices=THICKNESS,
+        source="d'Eon and Luebke 2007, sec. 14.5.3; along: Jimenez et al. 2010",
     )
     translucency_wrap: float = parameter(
         0.0,
@@ -158,7 +164,7 @@ class Technique(Parameters):
         if self.translucency not in MODELS or self.translucency == "none":
             return None
         details = (self.translucency_exponent, self.translucency_wrap, self.thickness_scale)
-        return Translucency(self.translucency, *details)
+        return Translucency(self.translucency, *details, self.translucency_thickness)
 
     @classmethod
     def where(cls, field: str) -> str:
@@ -184,6 +190,13 @@ class Technique(Parameters):
 
         A filter of the screen that knows is given the image in pieces, which takes less memory; its
         shader takes places in the image from shaders/screen.glsl.
+        """
+        return None
+
+    @property
+    def specular_white(self) -> float | None:
+        """The luminance of scattered light, over that of the strongest lamp, that leaves highlights
+        as they are; less dims them. None: highlights are their own.
         """
         return None
 

@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from renderer import gl
+from renderer.errors import InputError
 from renderer.optics import fits, gaussians
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
@@ -59,6 +60,12 @@ class Gosselin(AtlasTechnique):
     medium and the size of the atlas, as printed (eq. 12: kernel_size scale_x + scale_y). turned:
     each pass takes the taps a quarter turn on, so that four passes neither move the light (the
     taps lie off the middle) nor widen it more along u than along v; without it, as printed.
+
+    kernel_scale: where the material has a kernel_map (grey, an artist's), its value times the
+    first, plus the second, is what of the radius each texel takes; where there is none it is white.
+    specular "dimmed": highlights are multiplied by the luminance of the blurred light, as a share
+    of specular_full times that of the strongest lamp, so that they fade softly where light does
+    (eq. 18, where a lamp's colour would count twice); "own": they are those of all techniques.
     """
 
     blurs: int = parameter(
@@ -69,19 +76,40 @@ class Gosselin(AtlasTechnique):
         4.0, unit="texels", low=0.1, high=256.0, source="an artist's; the documents print none"
     )
     turned: bool = parameter(True, source="the list's mean is (0.03, -0.10) radii off its middle")
+    kernel_scale: tuple[float, float] = parameter(
+        (1.0, 0.0), unit="of the radius", low=0.0, high=16.0, source="eq. 12: scale_x, scale_y"
+    )
+    specular: str = parameter("dimmed", choices=("dimmed", "own"), source="eq. 18: dimmed")
+    specular_full: float = parameter(
+        1.0, unit="of the strongest lamp's luminance", low=1e-3, high=1e3, source="1: white, eq. 18"
+    )
 
     name: ClassVar[str] = "gosselin"
     title: ClassVar[str] = "Gosselin"
     paper: ClassVar[str] = "Gosselin 2004, GDC; Sander et al. 2004, SIGGRAPH sketches"
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not any(self.kernel_scale):
+            raise InputError(
+                f"{self.where('kernel_scale')} is (0, 0); expected one of them above 0"
+            )
+
+    @property
+    def specular_white(self) -> float | None:
+        return self.specular_full if self.specular == "dimmed" else None
+
     def radius_mm(self, curve: Curve) -> float:
-        """Of one pass, for a medium's curve."""
+        """Of one pass, for a medium's curve, before kernel_scale."""
         variance = float(fits.gaussian_sum(curve, 1).variance_mm2[0])
         return float(np.sqrt(variance / (self.blurs * VARIANCE.mean())))
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
-        """The Gaussian that the passes tend to; of a kernel in texels nothing is known in mm."""
-        variance = self.blurs * VARIANCE.mean() * self.radius_mm(curve) ** 2
+        """The Gaussian that the passes tend to where a map is white; of a kernel in texels nothing
+        is known in mm.
+        """
+        radius_mm = sum(self.kernel_scale) * self.radius_mm(curve)
+        variance = self.blurs * VARIANCE.mean() * radius_mm**2
         one = np.ones((1, curve.channels))
         return gaussians.line_integral(x_mm, np.inf, np.array([variance]), one)
 
@@ -94,6 +122,9 @@ class Gosselin(AtlasTechnique):
             "taps": len(POISSON),
             "stop": int(self.seams == "stop"),
             "even_mm": atlas.mean_texel_mm() if self.stretch == "none" or texels else 0.0,
+            "kernel_map": atlas.drawn.maps["kernel_map"],
+            "has_kernel_map": float("kernel_map" in atlas.drawn.item.primitive.material.maps),
+            "kernel_scale": self.kernel_scale,
         }
         radius = self.radius_texels * common["even_mm"]
         radius = radius if texels else self.radius_mm(atlas.inputs.curve)

@@ -148,8 +148,11 @@ def places(frame):
     return frame.view.eye + rays * depth[..., None], frame.surface.textures[0].read()[..., 3] > 0
 
 
-def surface_edge_response(technique, tilt_deg=0.0, size=(240, 60), height_mm=5.0):
-    """As `edge_response`, for a technique over the surfaces of a scene: a slab of 24 mm."""
+def surface_edge_response(technique, tilt_deg=0.0, size=(240, 60), height_mm=5.0, **material):
+    """As `edge_response`, for a technique over the surfaces of a scene: a slab of 24 mm.
+
+    material: what goes over the slab's own.
+    """
     turn = np.radians(tilt_deg)
     along, normal = np.array(
         [[np.cos(turn), 0.0, -np.sin(turn)], [np.sin(turn), 0.0, np.cos(turn)]]
@@ -157,7 +160,7 @@ def surface_edge_response(technique, tilt_deg=0.0, size=(240, 60), height_mm=5.0
     slab = {"shape": "slab", "size_mm": [24.0, 24.0, 20.0], "rotation_deg": [0.0, tilt_deg, 0.0]}
     table = {
         "objects": {"slab": slab},
-        "materials": {"slab": {"medium": "deon_luebke", "albedo": [1.0, 1.0, 1.0]}},
+        "materials": {"slab": {"medium": "deon_luebke", "albedo": [1.0, 1.0, 1.0], **material}},
         "environment": {"ambient": [1.0, 1.0, 1.0]},
         "camera": {
             "framing": "slab",

@@ -67,3 +67,20 @@ def test_translucent_of_the_first_edition_still_reads():
             renderer.make("golubev", wrong)
     with pytest.raises(InputError, match="expected the parameter translucency_wrap of a tech"):
         read_material({"transmission_wrap": 0.3}, "materials.head")
+
+
+def test_a_lamp_at_an_angle_sees_a_slab_as_thick_as_it_is():
+    """60 degrees off: half of the light falls on the face, through a thickness that stays."""
+    table = {**SLAB, "lights": {"back": {**SLAB["lights"]["back"], "direction": [0.866, 0, -0.5]}}}
+    thin = tr.curve_of("deon_luebke").at([THICKNESS_MM])[0]
+    slanted = tr.curve_of("deon_luebke").at([2 * THICKNESS_MM])[0]
+    graph = scenes.stage(scenes.read_scene(table)).graph
+    with (
+        renderer.Renderer(graph, (32, 32), 1, rays=8, shadow_map=1024) as drawing,
+        drawing.frame() as frame,
+    ):
+        for how in ("corrected", "entry"):
+            got = through(frame, "golubev", translucency_thickness=how)
+            np.testing.assert_allclose(got, 1.5 * thin, rtol=0.05, atol=2e-3)
+        got = through(frame, "golubev", translucency_thickness="along")
+        assert 1.5 * slanted[0] < got[0] < 0.7 * 1.5 * thin[0]  # a point is moved inwards
