@@ -37,7 +37,7 @@ def write(path: Path, study: Study, database: Database) -> dict[str, int]:
     """Write the archive, whole or not at all, of one snapshot of the database; rows by table."""
     about: dict[str, Any] = {"format": FORMAT, "study": study.name, "version": study.version}
     about |= {"files": {}, "tables": {}}
-    files = [MANIFEST, *dict.fromkeys(image.file for image in study.manifest.images)]
+    files = [MANIFEST, *dict.fromkeys(image.file for image in study.manifest.shown)]
     with replacing(path) as part:
         # nobody else reads the keys in it, not even while it is written
         opened = os.open(part, os.O_CREAT | os.O_WRONLY | os.O_EXCL, 0o600)

@@ -286,7 +286,7 @@ COLUMNS = (
     Column(
         "view",
         "text",
-        "beside, flicker, wipe, unscripted",
+        "beside, flicker, wipe, triplet, boosted, unscripted",
         (
             "How the pair was looked at when it was answered; unscripted: without JavaScript, side "
             "by side and scaled by the browser; empty: answered before it was recorded"
@@ -305,6 +305,8 @@ COLUMNS = (
             ("beside", "side by side, or one above the other"),
             ("flicker", "in one place, to be swapped"),
             ("wipe", "in one place, with a divider"),
+            ("triplet", "with the reference between the two"),
+            ("boosted", "with the reference between the two, differences from it boosted"),
         )
     ),
     Column(
@@ -321,7 +323,10 @@ COLUMNS = (
         "flips",
         "integer",
         "from 0",
-        "How often the images were swapped in place; empty without JavaScript",
+        (
+            "How often the images were swapped in place, of boosted triplets with the reference; "
+            "empty without JavaScript"
+        ),
         lambda r: r.response.flips,
     ),
     Column(
@@ -644,6 +649,7 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
         *(f"| `{c.name}` | {c.type} | {c.values} | {c.description} |" for c in columns(study)),
         "",
         f"Question: {definition.question.text}",
+        *_shown(study),
         "",
         *(f"- answer {level.value}: {level.label}" for level in definition.scale),
         *(
@@ -666,6 +672,21 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
         ),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _shown(study: Study) -> list[str]:
+    """What stood between the two images, of a study of triplets."""
+    viewer = study.definition.viewer
+    if not viewer.triplet:
+        return []
+    text = f"Shown: triplets, with the reference `{viewer.reference}` between the two images"
+    if boost := viewer.boost:
+        text += (
+            f", boosted: {boost.zoom} screen pixels an image pixel, differences from the reference "
+            f"times {boost.amplify:g}, each in turn with it {boost.flicker_hz:g} times a second"
+        )
+    counts = "An answer counts for the image that it names, as in a study of pairs."
+    return ["", f"{text}. {counts}"]
 
 
 def write(directory: Path, session: Session, study: Study, *, simulated: bool) -> int:

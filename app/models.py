@@ -189,6 +189,8 @@ class Response(Base):
     beside_ms: Mapped[int | None]
     flicker_ms: Mapped[int | None]
     wipe_ms: Mapped[int | None]
+    triplet_ms: Mapped[int | None]
+    boosted_ms: Mapped[int | None]
     away_ms: Mapped[int | None]
     flips: Mapped[int | None]
     pixel_scale: Mapped[float | None]

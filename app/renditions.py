@@ -40,10 +40,22 @@ class Changed(Exception):
 
 @dataclass(frozen=True)
 class Rendition:
-    """The box (left, top, right, bottom; pixels) of an image at a width on the screen, pixels."""
+    """The box (left, top, right, bottom; pixels) of an image at a width on the screen, pixels.
+
+    amplify: what its difference from the reference, if there is one, is multiplied by.
+    """
 
     image: Image
     width: int
+    reference: Image | None = None
+    amplify: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """Under which it is kept, without an ending."""
+        box = "-".join(map(str, self.image.box))
+        name = f"{self.image.sha256}_{box}_{self.width}"
+        return f"{name}_{self.reference.sha256}_{self.amplify:g}" if self.reference else name
 
     @property
     def natural(self) -> tuple[int, int]:
@@ -71,16 +83,15 @@ def rendition(rendered: Rendition, folder: Path, *, webp: bool) -> tuple[bytes, 
     Raises `Changed` where the file is not the one that the study was opened with.
     """
     image = rendered.image
-    path = image.path.resolve()
-    check(path, image.sha256)
-    box = "-".join(map(str, image.box))
-    kept = folder / f"{image.sha256}_{box}_{rendered.width}.{'webp' if webp else 'png'}"
+    for one in filter(None, (image, rendered.reference)):
+        check(one.path.resolve(), one.sha256)
+    kept = folder / f"{rendered.name}.{'webp' if webp else 'png'}"
     with _locks.setdefault(kept.name, threading.Lock()):
         try:
             data = kept.read_bytes()
             kept.touch()
         except OSError:
-            data = _made(rendered, path, webp)
+            data = _made(rendered, webp)
             _keep(kept, data)
     return data, WEBP if data[8:12] == b"WEBP" else PNG if data[1:4] == b"PNG" else image.media_type
 
@@ -97,26 +108,46 @@ def _digest(path: Path, _mtime_ns: int, _size: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _made(rendered: Rendition, path: Path, webp: bool) -> bytes:
+def _made(rendered: Rendition, webp: bool) -> bytes:
+    path = rendered.image.path.resolve()
     with PIL.Image.open(path) as picture:
-        picture.load()
         plain = picture.mode in ("RGB", "RGBA", "L") and not picture.info.keys() & _CHANGE_PIXELS
         whole = rendered.natural == picture.size and rendered.width == picture.width
-        if whole and (not plain or not webp):
+        if whole and not rendered.reference and (not plain or not webp):
             return path.read_bytes()  # nothing is gained, or something would be lost
         profile = picture.info.get("icc_profile")
-        if picture.mode.startswith("I"):  # 16 bits of grey, which Pillow would clip
-            picture = PIL.Image.fromarray((np.asarray(picture) // 257).astype(np.uint8))
-        if picture.mode not in ("RGB", "RGBA", "L"):
-            picture = picture.convert("RGBA" if "transparency" in picture.info else "RGB")
-        if not whole:
-            picture = picture.crop(rendered.image.box)
-        if picture.size != rendered.size:
-            picture = resampled(picture, rendered.size)
-        out = io.BytesIO()
-        more = {"icc_profile": profile} if profile else {}
-        picture.save(out, **(_WEBP if webp else {"format": "PNG"}), **more)
-        return out.getvalue()
+        shown = _cut(picture, rendered)
+    if rendered.reference:
+        with PIL.Image.open(rendered.reference.path.resolve()) as picture:
+            shown = amplified(shown, _cut(picture, rendered), rendered.amplify)
+    out = io.BytesIO()
+    more = {"icc_profile": profile} if profile else {}
+    shown.save(out, **(_WEBP if webp else {"format": "PNG"}), **more)
+    return out.getvalue()
+
+
+def _cut(picture: PIL.Image.Image, rendered: Rendition) -> PIL.Image.Image:
+    """The box of a picture, at the width."""
+    picture.load()
+    if picture.mode.startswith("I"):  # 16 bits of grey, which Pillow would clip
+        picture = PIL.Image.fromarray((np.asarray(picture) // 257).astype(np.uint8))
+    if picture.mode not in ("RGB", "RGBA", "L"):
+        picture = picture.convert("RGBA" if "transparency" in picture.info else "RGB")
+    if rendered.natural != picture.size:
+        picture = picture.crop(rendered.image.box)
+    return picture if picture.size == rendered.size else resampled(picture, rendered.size)
+
+
+def amplified(
+    picture: PIL.Image.Image, reference: PIL.Image.Image, factor: float
+) -> PIL.Image.Image:
+    """The reference with `factor` times the picture's difference from it, in sRGB values of 0 to
+    255, rounded and held to that range; RGB.
+    """
+    one, other = (np.asarray(each.convert("RGB"), np.float64) for each in (picture, reference))
+    return PIL.Image.fromarray(
+        np.clip(np.rint(other + factor * (one - other)), 0, 255).astype(np.uint8)
+    )
 
 
 def resampled(picture: PIL.Image.Image, size: tuple[int, int]) -> PIL.Image.Image:

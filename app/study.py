@@ -103,17 +103,27 @@ class Study:
             if key not in ("analysis", "recruiting")
         }
         if images:
-            seen["images"] = {f"{i.cell} {i.technique}": i.sha256 for i in self.manifest.images}
+            seen["images"] = {f"{i.cell} {i.technique}": i.sha256 for i in self.manifest.shown}
         return json.loads(json.dumps(seen))
 
     @cached_property
     def images_by_sha256(self) -> dict[str, Image]:
-        return {image.sha256: image for image in self.manifest.images}
+        return {image.sha256: image for image in self.manifest.shown}
 
     @cached_property
     def shown(self) -> dict[tuple[str, str], Image]:
         """By the sha256 and the box in the address of what a question shows of an image."""
-        return {(image.sha256, box_name(image)): image for image in self.manifest.images}
+        return {(image.sha256, box_name(image)): image for image in self.manifest.shown}
+
+    @cached_property
+    def boosted(self) -> dict[tuple[str, str, str], tuple[Image, Image]]:
+        """Images with their references, by the hashes of both and the box in the address of what
+        a boosted triplet shows of an image; empty where there are none.
+        """
+        if self.definition.viewer.boost is None:
+            return {}
+        pairs = [(image, self.manifest.reference(image.cell)) for image in self.manifest.images]
+        return {(one.sha256, two.sha256, box_name(one)): (one, two) for one, two in pairs}
 
     def image(self, cell: str, technique: str) -> Image:
         return self.manifest.image(cell, technique)

@@ -67,6 +67,7 @@ def init(app: Flask) -> None:
     app.register_blueprint(blueprint)
     app.register_error_handler(HTTPException, _error_page)
     app.add_template_filter(picture)
+    app.add_template_filter(side)
     app.context_processor(lambda: {"simulated": simulated()})
 
 
@@ -74,10 +75,26 @@ def picture(image: Image) -> dict[str, str | int]:
     """What a page's script needs to fetch and place an image: the address of its region without
     the width at which it is wanted, and the region's size in image pixels.
     """
+    return _picture(image, "web.shown", sha256=image.sha256)
+
+
+def side(image: Image) -> dict[str, str | int]:
+    """The same of an image as it stands at one side of a question."""
+    boost = study().definition.viewer.boost
+    if boost is None:
+        return picture(image)
+    reference = study().manifest.reference(image.cell)
+    amplify = f"{boost.amplify:g}"
+    return _picture(
+        image, "web.boosted", sha256=image.sha256, reference=reference.sha256, amplify=amplify
+    )
+
+
+def _picture(image: Image, endpoint: str, **address: str) -> dict[str, str | int]:
     left, top, right, bottom = image.box
-    address = url_for("web.shown", sha256=image.sha256, box=box_name(image), width=0)
+    place = url_for(endpoint, **address, box=box_name(image), width=0)
     return {
-        "address": address.removesuffix("0"),
+        "address": place.removesuffix("0"),
         "width": right - left,
         "height": bottom - top,
     }
@@ -106,8 +123,20 @@ def shown(sha256: str, box: str, width: int) -> Response:
     """The region of interest of an image, `width` pixels wide: what a question shows. Its address
     names the bytes of the image, the region and the size, so that it never changes either.
     """
-    region = study().shown.get((sha256, box))
-    wanted = region and renditions.Rendition(region, width)
+    image = study().shown.get((sha256, box))
+    return _rendition(image and renditions.Rendition(image, width))
+
+
+@blueprint.get("/images/<sha256>/<reference>/<amplify>/<box>/<int:width>")
+def boosted(sha256: str, reference: str, amplify: str, box: str, width: int) -> Response:
+    """The same with the difference from a reference amplified, where the study shows that."""
+    boost, images = study().definition.viewer.boost, study().boosted.get((sha256, reference, box))
+    if boost is None or amplify != f"{boost.amplify:g}":
+        images = None
+    return _rendition(images and renditions.Rendition(images[0], width, images[1], boost.amplify))
+
+
+def _rendition(wanted: renditions.Rendition | None) -> Response:
     if wanted is None or not wanted.offered:
         abort(404, gettext("This study has no such image."))
     # named, not by */*: every browser says the latter

@@ -38,6 +38,13 @@ CONSENT = {
     "{minutes} 分钟，没有时间限制。我们会记录：{recorded}。我们不会询问姓名、地址或其他个人信息。"
     "参与完全自愿：您可以随时关闭页面。回答将被分析，并以统计结果和匿名表格的形式发表。",
 }
+#: What is asked about two images and a reference where the study does not say.
+CLOSER = {
+    "en": "Which image is closer to the reference?",
+    "it": "Quale immagine è più vicina al riferimento?",
+    "pt": "Qual imagem está mais próxima da referência?",
+    "zh": "哪张图像更接近参考图像？",
+}
 #: What is asked for a reason where the study does not say.
 WHY = {"en": "Why?", "it": "Perché?", "pt": "Por quê?", "zh": "为什么？"}
 

@@ -12,7 +12,7 @@ from analysis.manifest import FORMATS, NAME, WHOLE, ManifestFile, open_manifest,
 from stimuli.errors import InputError
 from stimuli.study import FRAMING, Cell, Study, read_study
 from stimuli.table import Table
-from stimuli.viewing import FIT, ONE_TO_ONE
+from stimuli.viewing import FILES, FIT, ONE_TO_ONE
 
 FORMAT = FORMATS[-1]
 _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
@@ -67,6 +67,21 @@ class Manifest:
     study: Study
     images: tuple[Image, ...]
     licences: tuple[dict, ...]
+    references: tuple[Image, ...] = ()
+
+    @property
+    def shown(self) -> tuple[Image, ...]:
+        """All images that a page can show."""
+        return self.images + self.references
+
+    def reference(self, cell: str) -> Image | None:
+        """What stands between the two images of a cell; None where nothing does."""
+        viewer = self.study.viewer
+        if not viewer.triplet:
+            return None
+        if viewer.reference != FILES:
+            return self.image(cell, viewer.reference)
+        return next(image for image in self.references if image.cell == cell)
 
     def image(self, cell: str, technique: str) -> Image:
         """The image of a technique in a cell, by its name; KeyError where there is no such pair."""
@@ -93,6 +108,7 @@ def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
     for entry in entries:
         entry.value = {key: value for key, value in entry.value.items() if value is not None}
     images = tuple(_image(entry, study, file, place) for place, entry in enumerate(entries))
+    references = _references(table, study, images, file)
     licences = table.tables("licences", least=0) if "licences" in value else []
     for licence in licences:
         for key in ("what", "licence", "source"):
@@ -100,9 +116,15 @@ def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
     table.end()
     _one_each(study, images, entries, table)
     if verify:
-        for image, entry in zip(images, entries):
+        for image, entry in (*zip(images, entries), *references):
             _verify(image, entry)
-    return Manifest(directory, study, images, tuple(licence.value for licence in licences))
+    return Manifest(
+        directory,
+        study,
+        images,
+        tuple(licence.value for licence in licences),
+        tuple(image for image, _ in references),
+    )
 
 
 def sha256(path: Path) -> str:
@@ -111,7 +133,41 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _image(entry: Table, study: Study, manifest: ManifestFile, place: int) -> Image:
+def _references(
+    table: Table, study: Study, images: tuple[Image, ...], manifest: ManifestFile
+) -> list[tuple[Image, Table]]:
+    """`references`: a file for each cell, as large as the cell's images, where the study's viewer
+    says "files".
+    """
+    if "references" not in table.value and study.viewer.reference != FILES:
+        return []
+    read = []
+    for entry in table.tables("references", least=1):
+        cell = _cell(entry, study)
+        like = next(image for image in images if image.cell == cell.name)
+        image = Image(
+            cell=cell.name,
+            technique=FILES,
+            **_file(entry, manifest),
+            levels=cell.levels,
+            region=like.region,
+        )
+        if (image.width, image.height) != (like.width, like.height):
+            size = f"{(like.width, like.height)}, as the images at {cell.name}"
+            raise entry.fault("width, height", (image.width, image.height), size)
+        if any(other.cell == cell.name for other, _ in read):
+            raise InputError(f"{entry.source}: {entry.key}: a second reference at {cell.name}")
+        entry.end()
+        read.append((image, entry))
+    for cell in study.cells:
+        if not any(image.cell == cell.name for image, _ in read):
+            raise InputError(f"{table.source}: references: none at {cell.name}")
+    return read
+
+
+def _file(entry: Table, manifest: ManifestFile) -> dict:
+    """The file of an image: its path, size and hash."""
+
     def inside(text: str) -> bool:
         parts = PurePosixPath(text)
         return (
@@ -124,14 +180,20 @@ def _image(entry: Table, study: Study, manifest: ManifestFile, place: int) -> Im
         f"the path of a file inside the study's folder that ends in {', '.join(_MEDIA)}",
         inside,
     )
+    return {
+        "file": file,
+        "path": manifest.path.parent / file,
+        "width": entry.number("width", 1, 65535),
+        "height": entry.number("height", 1, 65535),
+        "sha256": entry.take("sha256", str, "64 hexadecimal digits in small letters", _is_sha256),
+    }
+
+
+def _image(entry: Table, study: Study, manifest: ManifestFile, place: int) -> Image:
     image = Image(
         cell=_cell(entry, study).name,
         technique=entry.one_of("technique", (condition.name for condition in study.techniques)),
-        file=file,
-        path=manifest.path.parent / file,
-        width=entry.number("width", 1, 65535),
-        height=entry.number("height", 1, 65535),
-        sha256=entry.take("sha256", str, "64 hexadecimal digits in small letters", _is_sha256),
+        **_file(entry, manifest),
         parameters=entry.take("parameters", dict, default={}),
         seed=entry.take("seed", int, default=None),
         renderer=entry.take("renderer", dict, default=None),

@@ -30,7 +30,15 @@ from stimuli.asking import (
     read_screen,
 )
 from stimuli.errors import InputError
-from stimuli.languages import CONSENT, PLACEHOLDERS, WHY, placeholders, read_languages, read_texts
+from stimuli.languages import (
+    CLOSER,
+    CONSENT,
+    PLACEHOLDERS,
+    WHY,
+    placeholders,
+    read_languages,
+    read_texts,
+)
 from stimuli.parts import read_toml
 from stimuli.recruiting import Recruiting, read_recruiting
 from stimuli.scenes import load_table, merge
@@ -66,6 +74,8 @@ RESERVED = frozenset(
         "beside_ms",
         "flicker_ms",
         "wipe_ms",
+        "triplet_ms",
+        "boosted_ms",
         "flips",
         "pixel_scale",
         "pixel_scale_largest",
@@ -395,10 +405,13 @@ def read_study(
     ready-made. display: of a study that says nothing of it.
     """
     languages = read_languages(table)
-    default = default_wording(languages[0], rendered=render is not None)
-    wording = Table({**default, **table.value}, table.source, table.key)
+    rendered = render is not None
     techniques = table.tables("techniques", least=2)
-    factors = _factors(table, rendered=render is not None)
+    conditions = [entry.name("name") for entry in techniques]
+    viewer = read_viewer(table.table("viewer", default={}), display, conditions, rendered)
+    default = default_wording(languages[0], rendered, viewer.triplet)
+    wording = Table({**default, **table.value}, table.source, table.key)
+    factors = _factors(table, rendered)
     cells = _cells(table, factors)
     asks = []
     for key in ("before", "after"):
@@ -406,7 +419,7 @@ def read_study(
         entries = table.tables(key, least=0) if key in table.value else []
         taken = [*RESERVED, *(factor.name for factor in factors), *(a.name for a in sum(asks, ()))]
         asks.append(read_asks(entries, taken))
-    shared = table.take("parameters", dict, default={}) if render is not None else {}
+    shared = table.take("parameters", dict, default={}) if rendered else {}
     study = Study(
         name=table.name("name"),
         title=table.text("title"),
@@ -414,7 +427,7 @@ def read_study(
         seed=table.number("seed", 0, 2**63 - 1),
         factors=factors,
         cells=cells,
-        techniques=tuple(_condition(t, render is not None, shared) for t in techniques),
+        techniques=tuple(_condition(t, rendered, shared) for t in techniques),
         question=_question(wording.table("question")),
         scale=_scale(wording),
         familiarity=_familiarity(wording.table("familiarity")),
@@ -422,7 +435,7 @@ def read_study(
         render=render,
         scene=scene,
         analysis=_analysis(table),
-        viewer=read_viewer(table.table("viewer", default={}), display),
+        viewer=viewer,
         before=asks[0],
         after=asks[1],
         reason=read_reason(table.table("reason", default={}), WHY[languages[0]]),
@@ -433,11 +446,11 @@ def read_study(
         quality=read_quality(
             table.table("quality", default={}),
             {cell.name: cell.levels for cell in cells},
-            [table.value["name"] for table in techniques],
+            conditions,
         ),
         languages=languages,
     )
-    study = replace(study, texts=_texts(table, study, rendered=render is not None))
+    study = replace(study, texts=_texts(table, study, rendered))
     refuse_doubles(techniques, "name")
     refuse_doubles(techniques, "label")
     for part in techniques:
@@ -533,7 +546,7 @@ def _texts(table: Table, study: Study, rendered: bool) -> dict[str, dict]:
     """
     defaults = {}
     for language in study.languages[1:]:
-        wording = default_wording(language, rendered)
+        wording = default_wording(language, rendered, study.viewer.triplet)
         texts = {
             "consent": wording["consent"],
             "question": wording["question"],
@@ -556,8 +569,10 @@ def _consent(table: Table) -> str:
     return text
 
 
-def default_wording(language: str, rendered: bool) -> dict:
-    """The thesis's wording in a language; ready-made images have a consent of their own."""
+def default_wording(language: str, rendered: bool, triplet: bool = False) -> dict:
+    """The thesis's wording in a language; ready-made images have a consent of their own, triplets
+    a question.
+    """
     thesis = _thesis()
     wording = {key: thesis[key] for key in _WORDING}
     if language != "en":
@@ -565,7 +580,12 @@ def default_wording(language: str, rendered: bool) -> dict:
         points = zip(thesis["scale"], texts["scale"])
         scale = [{**point, "label": text} for point, text in points]
         wording = {**{key: texts[key] for key in _WORDING}, "scale": scale}
-    return wording if rendered else {**wording, "consent": CONSENT[language]}
+    if not rendered or triplet:
+        wording = {**wording, "consent": CONSENT[language]}
+    if triplet:
+        labels = {key: wording["question"][key] for key in ("left_label", "right_label")}
+        wording = {**wording, "question": {"text": CLOSER[language], **labels}}
+    return wording
 
 
 @cache

@@ -64,6 +64,8 @@ class Answer:
     beside_ms: int | None = None
     flicker_ms: int | None = None
     wipe_ms: int | None = None
+    triplet_ms: int | None = None
+    boosted_ms: int | None = None
     away_ms: int | None = None
     flips: int | None = None
     pixel_scale: float | None = None

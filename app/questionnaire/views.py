@@ -29,10 +29,10 @@ from app.models import Participant
 from app.questionnaire import flow, screen, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
 from app.recruiting import Door
-from app.web import database, simulated, study, wants_json
+from app.web import database, picture, side, simulated, study, wants_json
 from stimuli.asking import LONGEST_TEXT, Ask
 from stimuli.manifest import Image
-from stimuli.viewing import REQUIRED
+from stimuli.viewing import REQUIRED, VIEWS
 
 blueprint = Blueprint("questionnaire", __name__)
 
@@ -48,7 +48,7 @@ _MEASURED = {
     **dict.fromkeys(("shown_width", "shown_height"), (float, 0, _LARGEST_SIZE)),
     "device_pixel_ratio": (float, 0, 100),
     **dict.fromkeys(
-        ("rt_ms", "beside_ms", "flicker_ms", "wipe_ms", "away_ms", "flips"),
+        ("rt_ms", *(f"{mode}_ms" for mode in VIEWS), "away_ms", "flips"),
         (int, 0, _LARGEST_RT_MS),
     ),
     **dict.fromkeys(("pixel_scale", "pixel_scale_largest"), (float, 0, 1000)),
@@ -84,9 +84,10 @@ def welcome():
                 "questionnaire/consent.html",
                 paragraphs=study().consent(language.current()),
                 # in no order that says anything: which are asked first is not drawn yet
-                upcoming=sorted(study().manifest.images, key=lambda image: image.sha256)[
-                    : 2 * PRELOADED_QUESTIONS
-                ],
+                upcoming=[
+                    side(image)
+                    for image in sorted(study().manifest.images, key=lambda one: one.sha256)
+                ][: 2 * PRELOADED_QUESTIONS],
             )
         place = _place(participant)
         if place in ("questionnaire.thanks", "questionnaire.withdrawn", "questionnaire.closed"):
@@ -291,6 +292,7 @@ def question():
         trial=trial,
         cell=study().cells.index(trial.cell),
         images=_images(trial),
+        reference=study().manifest.reference(trial.cell),
         upcoming=_of(following),
         measured=["view", *_MEASURED],
         reason=asked.reason if _asks_reason(participant, trial.order) else None,
@@ -486,10 +488,14 @@ def _redirect_to_due(participant: Participant | None):
     return None if place == request.endpoint else redirect(url_for(place), 303)
 
 
-def _of(trials: list[Row]) -> list[Image]:
-    """The images of trials, each once, in the order in which they are shown."""
-    images = [image for one in trials for image in _images(one)]
-    return list({(image.sha256, image.box): image for image in images}.values())
+def _of(trials: list[Row]) -> list[dict]:
+    """The pictures of trials, each once, in the order in which they are shown."""
+    pictures = []
+    for trial in trials:
+        pictures += [side(image) for image in _images(trial)]
+        if reference := study().manifest.reference(trial.cell):
+            pictures.append(picture(reference))
+    return list({one["address"]: one for one in pictures}.values())
 
 
 def _images(trial: Row) -> list[Image]:

@@ -5,6 +5,7 @@ import { FIT, GAP, HANDLE, heightOf, place, scales } from "./geometry.js";
 import { pictures } from "./pictures.js";
 
 const PAN_KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+const IN_PLACE = ["flicker", "wipe"], REFERENCE = 1; // its place in a triplet
 const PAN_SHARE = 0.15, WHEEL_STEP = 40, PINCH_STEP = 1.3, SOON_MS = 250;
 
 export class Viewer {
@@ -16,6 +17,7 @@ export class Viewer {
     this.figures = [...this.pair.querySelectorAll("figure")];
     this.labels = this.figures.map((figure) => figure.querySelector("figcaption").textContent);
     this.sides = JSON.parse(page.dataset.images);
+    if (page.dataset.reference) this.sides.splice(REFERENCE, 0, JSON.parse(page.dataset.reference));
     this.whole = JSON.parse(page.dataset.whole); // of the image that the region is cut from
     this.divider = this.pair.querySelector(".divider");
     this.mode = this.options.modes[0];
@@ -24,7 +26,7 @@ export class Viewer {
     this.swapped = false;
     this.flips = 0;
     this.pointers = new Map();
-    this.spent = { beside: 0, flicker: 0, wipe: 0, away: 0 };
+    this.spent = { beside: 0, flicker: 0, wipe: 0, triplet: 0, boosted: 0, away: 0 };
   }
 
   // Load and draw both; resolves when they are on the screen, from when time counts.
@@ -45,6 +47,21 @@ export class Viewer {
     this.largest = this.now.scale;
     this.since = performance.now();
     this.listen();
+    // somebody who asked for less motion starts it by themselves
+    if (this.options.boost?.flicker_hz) this.flicker(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+  }
+
+  // Let both take turns with the reference, so many times a second, or let them be.
+  flicker(on) {
+    this.flickering = on;
+    this.page.querySelector("[data-flicker]").setAttribute("aria-pressed", on);
+    const began = performance.now(), half = 500 / this.options.boost.flicker_hz, token = (this.turns = Symbol());
+    const turn = (now) => {
+      if (token !== this.turns || !this.pair.isConnected) return;
+      this.swapTo(on && Math.floor((now - began) / half) % 2 === 1);
+      if (on) requestAnimationFrame(turn);
+    };
+    turn(began);
   }
 
   // Where everything stands now; pictures of another size are waited for, and what is shown meanwhile stays.
@@ -108,7 +125,7 @@ export class Viewer {
 
   see(movable) {
     this.pair.classList.toggle("movable", movable);
-    this.pair.classList.toggle("held", this.mode !== "beside" || movable || this.scales.length > 1);
+    this.pair.classList.toggle("held", IN_PLACE.includes(this.mode) || movable || this.scales.length > 1);
   }
 
   draw() {
@@ -133,7 +150,10 @@ export class Viewer {
       this.figures[k].querySelector("figcaption").replaceChildren(...text.map((part) => Object.assign(document.createElement("span"), { textContent: part })));
       this.canvases[k].setAttribute("aria-label", `${this.words.image} ${spoken}`);
     };
-    if (mode === "beside") return this.canvases.forEach((canvas, k) => (paint(canvas, this.bitmaps[k]), label(k, [this.labels[k]], this.labels[k])));
+    if (!IN_PLACE.includes(mode)) return this.canvases.forEach((canvas, k) => {
+      paint(canvas, this.bitmaps[this.swapped ? REFERENCE : k]);
+      label(k, [this.labels[k]], this.labels[k]);
+    });
     const front = mode === "flicker" && this.swapped ? 1 : 0;
     paint(this.canvases[0], this.bitmaps[front]); // at once over what was there: no frame is blank
     if (mode === "flicker") label(0, [this.labels[front]], this.labels[front]);
@@ -178,7 +198,11 @@ export class Viewer {
   }
 
   swap(on) {
-    if (this.mode !== "flicker" || on === this.swapped) return;
+    if (this.mode === "flicker") this.swapTo(on);
+  }
+
+  swapTo(on) {
+    if (on === this.swapped) return;
     this.swapped = on;
     this.flips += 1;
     this.draw();
@@ -193,6 +217,7 @@ export class Viewer {
     }
     if (!keys) return false;
     if (key === "v") this.nextMode();
+    else if (key === "f" && this.options.boost?.flicker_hz) this.flicker(!this.flickering);
     else if (key === "f") this.swap(true);
     else if (key === "+" || key === "=") this.zoom(1);
     else if (key === "-") this.zoom(-1);
@@ -210,8 +235,9 @@ export class Viewer {
     };
     ratioChanged();
     page.addEventListener("click", (event) => {
-      const button = event.target.closest("[data-mode], [data-zoom], [data-swap]");
+      const button = event.target.closest("[data-mode], [data-zoom], [data-swap], [data-flicker]");
       if (!button) return;
+      if (button.hasAttribute("data-flicker")) return this.flicker(!this.flickering);
       if (button.dataset.mode) this.setMode(button.dataset.mode);
       else if (button.dataset.zoom) this.zoom(Number(button.dataset.zoom));
       else this.swap(!this.swapped);
@@ -272,7 +298,7 @@ export class Viewer {
         this.apart = apart;
       }
       this.pan(x / 2, y / 2);
-    } else if (this.mode === "beside" || event.shiftKey) this.pan(x, y);
+    } else if (!IN_PLACE.includes(this.mode) || event.shiftKey) this.pan(x, y);
     else if (this.mode === "wipe") this.splitAt(event);
   }
 
@@ -303,19 +329,16 @@ export class Viewer {
   // What is sent with an answer.
   record() {
     this.tick();
-    const { beside, flicker, wipe, away } = this.spent, { scale, room } = this.now, whole = this.whole;
+    const { scale, room } = this.now, whole = this.whole;
     return {
-      rt_ms: Math.round(beside + flicker + wipe + away),
+      rt_ms: Math.round(Object.values(this.spent).reduce((sum, one) => sum + one)),
       viewport_width: window.innerWidth,
       viewport_height: window.innerHeight,
       device_pixel_ratio: window.devicePixelRatio,
       shown_width: ((whole.width * scale) / room.ratio).toFixed(2),
       shown_height: ((whole.height * scale) / room.ratio).toFixed(2),
       view: this.now.mode,
-      beside_ms: Math.round(beside),
-      flicker_ms: Math.round(flicker),
-      wipe_ms: Math.round(wipe),
-      away_ms: Math.round(away),
+      ...Object.fromEntries(Object.entries(this.spent).map(([name, spent]) => [`${name}_ms`, Math.round(spent)])),
       flips: this.flips,
       pixel_scale: this.first.scale.toFixed(4),
       pixel_scale_largest: this.largest.toFixed(4),

@@ -365,11 +365,15 @@ def test_one_file_is_drawn_alike_on_both_sides(noise_study, chromium, width, hei
     flags = [f"--force-device-scale-factor={ratio}", f"--window-size={width},{height}"]
     launch = chromium.browser_type.launch
     exact, fitted = noise_study("exact"), noise_study("fit", display="fit")
+    triplets = noise_study("triplet", modes=["triplet"], reference="none")
+    boosted = noise_study("boosted", modes=["boosted"], reference="none", boost={"zoom": 3})
     with Image.open(next((exact / "images").glob("*.png"))) as file:
         noise = np.asarray(file)[108:432, 96:864]  # of the region [0.1, 0.2, 0.9, 0.8]
     with (
         running(create_app(exact)) as address,
         running(create_app(fitted)) as fitted_address,
+        running(create_app(triplets)) as triplet_address,
+        running(create_app(boosted)) as boosted_address,
         launch(executable_path=chromium_path(), args=[*FLAGS, *flags]) as browser,
         browser.new_context(no_viewport=True) as context,
     ):
@@ -398,6 +402,16 @@ def test_one_file_is_drawn_alike_on_both_sides(noise_study, chromium, width, hei
         address = json.loads(page.locator("main").get_attribute("data-images"))[0]["address"]
         sent = page.request.get(f"{fitted_address[:-1]}{address}{drawn[0].shape[1]}")
         np.testing.assert_array_equal(drawn[0], picture(sent.body()))
+        if ratio not in (1, 3):  # each costs seconds; where they stand is whole at any ratio
+            return
+        for address, times in ((triplet_address, 1), (boosted_address, 3)):
+            begin(page, address)
+            expect(page.locator(".badge")).to_have_text(f"{times}:1")
+            blocks = np.kron(noise, np.ones((times, times, 1), np.uint8))
+            drawn = on_screen(page, ratio)
+            assert len(drawn) == 3
+            for one in drawn:
+                np.testing.assert_array_equal(one, middle(blocks, one.shape))
 
 
 @pytest.fixture
@@ -679,3 +693,69 @@ def test_a_phone_is_asked_in_chinese_and_the_language_can_be_changed(
         shown(page, 2)
         expect(page.locator("html")).to_have_attribute("lang", "en")
         expect(page.locator("legend")).to_have_text("Which is more real?")
+
+
+def test_boosted_images_take_turns_with_the_reference_unless_that_is_stopped(
+    chromium, tmp_path, write_study
+):
+    """At the rate of the study, both at once; not where less motion is asked for."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    boost = {"flicker_hz": 5, "amplify": 2}
+    viewer = {"modes": ["boosted"], "reference": "golubev", "boost": boost}
+    app = create_app(write_study(tmp_path / "study", size=(320, 180), viewer=viewer))
+    look = """async (frames) => {
+      const canvases = [...document.querySelectorAll(".pair canvas")], seen = [];
+      const reader = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+      for (let k = 0; k < frames; k += 1) {
+        await new Promise(requestAnimationFrame);
+        seen.push(canvases.map((canvas) => {
+          reader.drawImage(canvas, 0, 0, 1, 1);
+          return [...reader.getImageData(0, 0, 1, 1).data].join();
+        }));
+      }
+      return seen;
+    }"""
+    with (
+        running(app) as address,
+        chromium.new_context(
+            viewport={"width": 1280, "height": 720}, reduced_motion="reduce"
+        ) as context,
+    ):
+        page = context.new_page()
+        begin(page, address)
+        captions = page.locator("figcaption").all_text_contents()
+        assert captions == ["A", "Reference", "B"]
+        button = page.locator("[data-flicker]")
+        expect(button).to_have_attribute("aria-pressed", "false")
+        still = page.evaluate(look, 10)
+        assert len(set(map(tuple, still))) == 1
+        colours = [tuple(map(int, one.split(",")))[:3] for one in still[0]]
+        study = app.extensions["study"]
+        with app.extensions["database"].read() as db:
+            trial = db.scalars(select(Trial).order_by(Trial.order)).first()
+        a, reference, b = (
+            np.asarray(Image.open(study.image(trial.cell, name).path))[0, 0].astype(int)
+            for name in (trial.left, "golubev", trial.right)
+        )
+        for seen, raw in zip(colours, (a, reference, b)):
+            assert seen == tuple(np.clip(reference + 2 * (raw - reference), 0, 255))
+        button.click()
+        expect(button).to_have_attribute("aria-pressed", "true")
+        moving = {*map(tuple, page.evaluate(look, 40))}
+        assert moving == {tuple(still[0]), (still[0][1],) * 3}  # both at once, nothing between
+        page.keyboard.press("f")
+        expect(button).to_have_attribute("aria-pressed", "false")
+        assert len({*map(tuple, page.evaluate(look, 10))}) == 1
+        assert Axe().run(page, options=RULES).response["violations"] == []
+        page.set_viewport_size({"width": 390, "height": 844})
+        boxes = [one.bounding_box() for one in page.locator(".pair canvas").all()]
+        assert len({box["x"] for box in boxes}) == 1 and boxes[0]["y"] < boxes[1]["y"]
+        assert Axe().run(page, options=RULES).response["violations"] == []
+        page.keyboard.press("4")
+        page.keyboard.press("Enter")
+        shown(page, 2)
+    ((_, row),) = stored(app)
+    assert row.view == "boosted" and row.pixel_scale == 2
+    assert row.boosted_ms == pytest.approx(row.rt_ms - row.away_ms, abs=2)
+    assert 2 <= row.flips <= 2 * 5 * row.rt_ms / 1000 + 2

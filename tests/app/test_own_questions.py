@@ -172,7 +172,7 @@ STORED = {
     "the size of your window and of the images on it, and its scaling": "viewport_width "
     "viewport_height device_pixel_ratio shown_width shown_height pixel_scale seen_share",
     "how you looked at each pair (views, zoom, how long)": "view beside_ms flicker_ms wipe_ms "
-    "flips pixel_scale_largest",
+    "triplet_ms boosted_ms flips pixel_scale_largest",
     "how long the page was out of sight": "away_ms",
     "the language of the pages": "language consent_language",
 }
