@@ -220,10 +220,11 @@ COLUMNS = (
     Column(
         "seed",
         "text",
-        "study seed/number",
+        "study seed/list number",
         (
-            "What the participant's order and sides were drawn from: the seed of the study and "
-            "the participant's number"
+            "What pairs, order and sides were drawn from: the seed of the study and the number of "
+            "the list; without the word list, drawn before lists were dealt, by the participant's "
+            "number"
         ),
         lambda r: r.trial.seed,
     ),

@@ -122,6 +122,8 @@ class Participant(Base):
     recruit: Mapped[str | None] = mapped_column(String(2000))
     # the first of it: who takes part once
     recruit_id: Mapped[str | None] = mapped_column(String(100), index=True, unique=True)
+    # of stimuli.design; None: began before lists were dealt, drawn by the participant's number
+    list_number: Mapped[int | None]
     excluded_at: Mapped[datetime | None]
     excluded_because: Mapped[str | None] = mapped_column(String(500))
 

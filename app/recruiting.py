@@ -78,14 +78,21 @@ def admission(session: Session, study: Study, fields: Mapping[str, str]) -> Door
 
 def places(session: Session, record: StudyRecord) -> int:
     """How many places are taken."""
+    query = select(func.count()).where(counts(), finished_or_at_it(record))
+    return session.scalar(query)
+
+
+def finished_or_at_it(record: StudyRecord):
+    """The participants who finished, or began or answered within the time of a reservation, as an
+    SQL condition.
+    """
     since = now() - timedelta(minutes=record.reservation_minutes)
     last = select(func.max(Response.answered_at)).where(Response.participant_id == Participant.id)
-    at_it = and_(
-        Participant.completed_at.is_(None),
-        or_(Participant.consented_at > since, last.scalar_subquery() > since),
+    return or_(
+        Participant.completed_at.is_not(None),
+        Participant.consented_at > since,
+        last.scalar_subquery() > since,
     )
-    query = select(func.count()).where(counts(), or_(Participant.completed_at.is_not(None), at_it))
-    return session.scalar(query)
 
 
 def counts():

@@ -30,6 +30,22 @@ def read_participants(table: Table) -> Participants:
 
 
 @dataclass(frozen=True)
+class Assignment:
+    """pairs: how many of the study's pairs a participant is asked, 0 for all; which ones is dealt
+    evenly (`stimuli.design`).
+    """
+
+    pairs: int = 0
+
+
+def read_assignment(table: Table, pairs: int) -> Assignment:
+    """The table `[assignment]` of a study of so many pairs, checked."""
+    assignment = Assignment(table.number("pairs", 0, pairs, default=0))
+    table.end()
+    return assignment
+
+
+@dataclass(frozen=True)
 class Trap:
     """A pair with an obvious answer: `better` against `worse` within a cell."""
 
@@ -79,21 +95,23 @@ def read_quality(
     table: Table,
     cells: dict[str, dict[str, str]],
     techniques: Sequence[str],
+    pairs: int,
 ) -> Quality:
-    """The table `[quality]` of a study, checked. cells: the levels of each cell, by its name."""
+    """The table `[quality]` of a study, checked. cells: the levels of each cell, by its name;
+    pairs: how many a participant is asked.
+    """
     counts = {
         name: table.number(name, 0, 1000, default=0)
         for name in ("practice", "repeats", "swapped", "bias")
     }
-    pairs = len(cells) * len(techniques) * (len(techniques) - 1) // 2
     if counts["repeats"] + counts["swapped"] > pairs // 2:
         raise InputError(
             f"{table.source}: {table.key}: repeats and swapped are "
             f"{counts['repeats'] + counts['swapped']} together, expected at most {pairs // 2}: "
-            "half of the study's pairs, since what is asked again was asked in the first half"
+            "half of a participant's pairs, since what is asked again was asked in the first half"
         )
     if counts["practice"] > pairs:
-        raise table.fault("practice", counts["practice"], f"at most {pairs}, the study's pairs")
+        raise table.fault("practice", counts["practice"], f"at most {pairs}, a participant's pairs")
     traps = []
     table.take("traps", list, "a list of tables", default=[])
     for entry in table.tables("traps", least=0) if "traps" in table.value else []:

@@ -1,12 +1,27 @@
-"""Which participant sees which pairs, in which order and on which side."""
+"""Which list of questions shows which pairs, in which order and on which side.
 
-from collections.abc import Sequence
+Lists are numbered from 1 and made two by two: the second of a couple asks the same pairs on the
+other sides in the opposite order, so that over both every pair stood on each side once and its mean
+place is the middle. Within a list, each technique stands on the left as often as on the right in
+each cell, to one (pairs are given sides along an Euler tour). Where a list has
+some of the pairs, couples are dealt from a shuffled sequence without end, so that no pair is ever
+more than one couple of lists ahead of another.
+
+Everything comes from the raw 64-bit words of PCG64 seeded by the study's seed and the list's
+number: unlike the distributions built on them, numpy promises never to change those (NEP 19), so a
+seed gives the same study under every version.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from math import gcd
 
 import numpy as np
 
 from stimuli.asking import Quality
+
+#: What a stream of random words is for; the first is followed by the list's number.
+_QUALITY, _DEAL, _LIST = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -26,54 +41,134 @@ def trials(
     cells: Sequence[str],
     techniques: Sequence[str],
     seed: int,
-    participant: int,
+    number: int,
     quality: Quality | None = None,
+    pairs: int = 0,
 ) -> list[Trial]:
-    """The trials of one participant: every pair of techniques once within each cell, and those that
+    """The trials of one list: pairs of techniques within cells, each at most once, and those that
     `quality` adds.
-
-    The order is shuffled over all cells and the sides are drawn at random. Both come from the
-    raw 64-bit words of PCG64 seeded by (seed, participant): unlike the distributions built on them,
-    numpy promises never to change those (NEP 19), so a seed gives the same study under every
-    version. What is added is drawn after, so that it leaves the order of the others as it is.
 
     Parameters
     ----------
     cells, techniques : names, in the order of the study
     seed : of the study, >= 0
-    participant : running number of the participant, >= 0
+    number : of the list, from 1
     quality : a pair that is asked again was asked in the first half and comes in the second;
         traps and pairs of one image stand anywhere; practice comes first, of pairs that are drawn
-        from the study's
+        from the list's. They are drawn after and leave the order of the others as it is.
+    pairs : how many of the study's pairs the list has; 0: all
     """
-    pairs = [(cell, *pair) for cell in cells for pair in combinations(techniques, 2)]
-    draw = np.random.PCG64([seed, participant]).random_raw
-    order, sides = np.argsort(draw(len(pairs)), kind="stable"), draw(len(pairs)) >> np.uint64(63)
-    main = []
-    for position, (pair, swap) in enumerate(zip(order, sides), start=1):
-        cell, left, right = pairs[pair]
-        main.append(Trial(position, cell, *((right, left) if swap else (left, right))))
-    return (
-        _with_quality(main, cells, techniques, quality, draw)
-        if quality and quality.questions
-        else main
-    )
+    couple, mirrored = divmod(number - 1, 2)
+    share = _shares(seed, _LIST, couple)
+    order = _shuffled(_dealt(cells, techniques, seed, couple, pairs), share)
+    sided = _sided(order, share)
+    if mirrored:
+        sided = [(cell, right, left) for cell, left, right in reversed(sided)]
+    main = [Trial(place, *one) for place, one in enumerate(sided, start=1)]
+    if not quality or not quality.questions:
+        return main
+    return _with_quality(main, cells, techniques, quality, _shares(seed, _QUALITY, number))
 
 
-def _with_quality(main, cells, techniques, quality: Quality, draw) -> list[Trial]:
-    def share() -> float:  # from 0, below 1
-        return float(int(draw()) >> 11) * 2.0**-53
+def _shares(*words: int) -> Callable[[], float]:
+    """Random numbers from 0, below 1."""
+    draw = np.random.PCG64([*words]).random_raw
+    return lambda: float(int(draw()) >> 11) * 2.0**-53
 
+
+def _shuffled(of: Sequence, share: Callable[[], float]) -> list:
+    of = list(of)
+    return [of[k] for k in np.argsort([share() for _ in of], kind="stable")]
+
+
+def _dealt(
+    cells: Sequence[str], techniques: Sequence[str], seed: int, couple: int, pairs: int
+) -> list[tuple[str, str, str]]:
+    """The pairs of a couple of lists: the next ones of a sequence of all pairs, which is gone
+    through again and again and shuffled anew when it ends where a couple does.
+    """
+    every = len(cells) * len(techniques) * (len(techniques) - 1) // 2
+    some = pairs or every
+    couples = every // gcd(some, every)  # until both end together
+    deal, place = divmod(couple, couples)
+    share = _shares(seed, _DEAL, deal)
+    by_cell = [
+        [(cell, *pair) for pair in _rounds(_shuffled(techniques, share), techniques, share)]
+        for cell in _shuffled(cells, share)
+    ]
+    sequence = [pair for turn in zip(*by_cell) for pair in turn]  # a pair of each cell in turn
+    return [sequence[(place * some + k) % every] for k in range(some)]
+
+
+def _rounds(
+    shuffled: list[str], techniques: Sequence[str], share: Callable[[], float]
+) -> list[tuple[str, str]]:
+    """All pairs, round by round of a tournament in which everybody plays once a round (the circle
+    method; with an odd number one sits out): neighbours in it are of different techniques.
+    """
+    players: list[str | None] = [*shuffled, *([None] if len(shuffled) % 2 else [])]
+    rounds = []
+    for _ in range(len(players) - 1):
+        half = len(players) // 2
+        games = zip(players[:half], reversed(players[half:]))
+        rounds.append([game for game in games if None not in game])
+        players = [players[0], players[-1], *players[1:-1]]
+    place = {name: k for k, name in enumerate(techniques)}
+    return [
+        tuple(sorted(game, key=place.get))
+        for games in _shuffled(rounds, share)
+        for game in _shuffled(games, share)
+    ]
+
+
+def _sided(
+    order: list[tuple[str, str, str]], share: Callable[[], float]
+) -> list[tuple[str, str, str]]:
+    """The same pairs with sides: in each cell every technique is left as often as right, to one.
+
+    In each cell the pairs are the edges of a graph. Where an odd number meets at a technique, an
+    edge to nowhere is added; walking until there is no way on then ends where it began, and enters
+    every technique as often as it leaves it.
+    """
+    sided = list(order)
+    for cell in dict.fromkeys(cell for cell, *_ in order):
+        edges = {k: one[1:] for k, one in enumerate(order) if one[0] == cell}
+        meeting: dict[str | None, list[int]] = {}
+        for k in _shuffled(edges, share):
+            for end in edges[k]:
+                meeting.setdefault(end, []).append(k)
+        for k, end in enumerate([end for end, at in meeting.items() if len(at) % 2], start=1):
+            edges[-k] = end, None
+            meeting[end].append(-k)
+            meeting.setdefault(None, []).append(-k)
+        walked: set[int] = set()
+        backwards = share() < 0.5
+        for start in list(meeting):
+            here = start
+            while left := [k for k in meeting[here] if k not in walked]:
+                k = left[0]
+                walked.add(k)
+                there = edges[k][1] if edges[k][0] == here else edges[k][0]
+                if k >= 0:
+                    sided[k] = (cell, there, here) if backwards else (cell, here, there)
+                here = there
+    return sided
+
+
+def _with_quality(
+    main: list[Trial],
+    cells: Sequence[str],
+    techniques: Sequence[str],
+    quality: Quality,
+    share: Callable[[], float],
+) -> list[Trial]:
     def sided(cell: str, one: str, other: str, kind: str) -> Trial:
         left, right = (one, other) if share() < 0.5 else (other, one)
         return Trial(0, cell, left, right, kind)
 
-    def some(of: list, count: int) -> list:
-        return [of[k] for k in np.argsort([share() for _ in of], kind="stable")[:count]]
-
     placed = [(float(trial.order), trial) for trial in main]
     half = len(main) / 2
-    again = some(main[: len(main) // 2], quality.repeats + quality.swapped)
+    again = _shuffled(main[: len(main) // 2], share)[: quality.repeats + quality.swapped]
     for k, trial in enumerate(again):
         if k < quality.repeats:
             copy = replace(trial, kind="repeat")
@@ -86,7 +181,7 @@ def _with_quality(main, cells, techniques, quality: Quality, draw) -> list[Trial
     for _ in range(quality.bias):
         cell, one = cells[int(share() * len(cells))], techniques[int(share() * len(techniques))]
         placed.append((1 + share() * len(main), Trial(0, cell, one, one, "bias")))
-    for k, trial in enumerate(some(main, quality.practice)):
+    for k, trial in enumerate(_shuffled(main, share)[: quality.practice]):
         placed.append((k / (1 + quality.practice), replace(trial, kind="practice")))
     placed.sort(key=lambda pair: pair[0])
     return [replace(trial, order=order) for order, (_, trial) in enumerate(placed, start=1)]

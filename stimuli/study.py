@@ -17,12 +17,14 @@ from analysis.declared import options
 from analysis.manifest import WHOLE, read_region, read_self_rating
 from stimuli.asking import (
     Ask,
+    Assignment,
     Pages,
     Participants,
     Quality,
     Reason,
     Screen,
     read_asks,
+    read_assignment,
     read_pages,
     read_participants,
     read_quality,
@@ -220,6 +222,7 @@ class Study:
     viewer: Viewer = Viewer()
     recruiting: Recruiting = Recruiting()
     participants: Participants = Participants()
+    assignment: Assignment = Assignment()
     quality: Quality = Quality()
     before: tuple[Ask, ...] = ()
     after: tuple[Ask, ...] = ()
@@ -236,11 +239,18 @@ class Study:
 
     @property
     def questions(self) -> int:
-        """How many a participant is asked: every pair of conditions once in each cell, and those
-        that tell how well people look.
-        """
-        count = len(self.techniques)
-        return len(self.cells) * count * (count - 1) // 2 + self.quality.questions
+        """How many a participant is asked: pairs, and those that tell how well people look."""
+        return self.pairs_each + self.quality.questions
+
+    @property
+    def pairs(self) -> int:
+        """How many there are: every two conditions once in each cell."""
+        return len(self.cells) * len(self.techniques) * (len(self.techniques) - 1) // 2
+
+    @property
+    def pairs_each(self) -> int:
+        """How many of them a participant is asked."""
+        return self.assignment.pairs or self.pairs
 
     def factor(self, name: str) -> Factor:
         """A factor by its name; KeyError where the study has none such."""
@@ -343,6 +353,7 @@ class Study:
             "viewer": self.viewer.record(),
             **({"recruiting": self.recruiting.record()} if self.recruiting != Recruiting() else {}),
             "participants": vars(self.participants),
+            "assignment": vars(self.assignment),
             "quality": self.quality.record({cell.name: cell.levels for cell in self.cells}),
             "before": [ask.record() for ask in self.before],
             "after": [ask.record() for ask in self.after],
@@ -419,6 +430,8 @@ def read_study(
         entries = table.tables(key, least=0) if key in table.value else []
         taken = [*RESERVED, *(factor.name for factor in factors), *(a.name for a in sum(asks, ()))]
         asks.append(read_asks(entries, taken))
+    every = len(cells) * len(techniques) * (len(techniques) - 1) // 2
+    assignment = read_assignment(table.table("assignment", default={}), every)
     shared = table.take("parameters", dict, default={}) if rendered else {}
     study = Study(
         name=table.name("name"),
@@ -447,7 +460,9 @@ def read_study(
             table.table("quality", default={}),
             {cell.name: cell.levels for cell in cells},
             conditions,
+            assignment.pairs or every,
         ),
+        assignment=assignment,
         languages=languages,
     )
     study = replace(study, texts=_texts(table, study, rendered))

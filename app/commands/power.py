@@ -70,7 +70,7 @@ from app.answers import names, numbers, written
     metavar="N",
     help=(
         "Pairs that the incomplete and the adaptive design ask each person at a framing. "
-        "Without it half of them."
+        "Without it those of the study's [assignment], or half of them."
     ),
 )
 @click.option(
@@ -208,7 +208,7 @@ def command(
         worths=table,
         answering=answering,
         framings=cells,
-        answers_each=answers,
+        answers_each=answers or definition.assignment.pairs // len(cells),
         options=options,
         power=wanted,
         most=most,
@@ -226,6 +226,10 @@ def command(
     write_files(files, out)
     for sentence in sentences:
         click.echo(sentence)
+    click.echo(
+        f"the study asks each person {definition.pairs_each} of {definition.pairs} pairs: "
+        f"{20 * definition.pairs_each / definition.pairs:.3g} answers a pair from 20 people"
+    )
     if fingerprint:
         click.echo(f"sha256 of the study's [analysis]: {fingerprint}")
     click.echo(f"{out / 'power.md'}: {studies} simulated studies for each design, seed {seed}")

@@ -81,7 +81,9 @@ def new(
     for note in folders.remarks(study, out):
         click.echo(note, err=True)
     low, high = minutes(study)
+    few = "[assignment] pairs = N asks each person fewer"
     click.echo(f"each person is asked {study.questions} questions: {low} to {high} minutes")
+    click.echo(f"20 people give each of the {study.pairs} pairs 20 answers; {few}")
     click.echo(f"{out / folders.STUDY_FILE}: texts to look through; then")
     click.echo(f"subdermal study refresh {out}    # after each change")
     click.echo(f"subdermal serve {out}            # http://127.0.0.1:8000/")

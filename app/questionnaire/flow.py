@@ -129,7 +129,7 @@ def enrol(
         participant.recruit_id = link_fields.get(study.definition.recruiting.parameters[0])
     session.add(participant)
     session.flush()  # gives the number
-    session.add_all(assign(study, participant))
+    assign(session, study, record, participant)
     _note(session, participant, "consented")
     return participant
 

@@ -38,7 +38,7 @@ def test_trials_are_those_of_the_design_and_recorded(app, person):
                 [(t.order, t.cell, t.left, t.right) for t in some] for some in (recorded, expected)
             ]
             assert lists[0] == lists[1]
-            assert {t.seed for t in recorded} == {f"7/{number}"}
+            assert {t.seed for t in recorded} == {f"7/list {number}"}
 
 
 def test_the_page_does_not_tell_which_technique_is_shown(app, person):

@@ -15,6 +15,7 @@ FRAMINGS = ("close-up", "head-shot", "half-length")
 TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
 
 POSTS = [
+    "/language",
     "/",
     "/familiarity",
     "/before",

@@ -1,0 +1,111 @@
+"""Who gets which list."""
+
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+
+import pytest
+from sqlalchemy import select
+
+from app import create_app
+from app.models import Participant, Response, Trial
+from app.questionnaire import flow
+from app.recruiting import exclude, record_of, set_state
+from stimuli.errors import InputError
+
+
+def numbers(app):
+    with app.extensions["database"].read() as db:
+        query = select(Participant.list_number).order_by(Participant.id)
+        return list(db.scalars(query))
+
+
+def change(app, number, **values):
+    with app.extensions["database"].write() as db:
+        for name, value in values.items():
+            setattr(db.get(Participant, number), name, value)
+
+
+def test_at_once_everybody_gets_a_list_of_their_own(app):
+    database, study = app.extensions["database"], app.extensions["study"]
+
+    def enrol(visit):
+        with database.write() as db:
+            flow.enrol(db, study, str(visit))
+
+    with ThreadPoolExecutor(8) as at_once:
+        list(at_once.map(enrol, range(20)))
+    assert sorted(numbers(app)) == list(range(1, 21))
+    with database.read() as db:
+        left = Counter(db.scalars(select(Trial.left)))
+        right = Counter(db.scalars(select(Trial.right)))
+    assert left == right  # nothing is left to chance
+
+
+def test_the_list_of_who_does_not_count_is_given_anew(app, person):
+    for _ in range(4):
+        person().begin()
+    assert numbers(app) == [1, 2, 3, 4]
+    with app.extensions["database"].write() as db:
+        exclude(db, db.get(Participant, 2), "asleep")
+        flow.withdraw(db, db.get(Participant, 3))
+        hours = timedelta(hours=5)
+        db.get(Participant, 1).consented_at -= hours  # begun long ago, and nothing answered since
+    person().begin(), person().begin(), person().begin(), person().begin()
+    assert numbers(app) == [1, 2, 3, 4, 1, 2, 3, 5]
+
+
+def test_who_still_answers_keeps_the_list(app, person):
+    slow = person().begin()
+    with app.extensions["database"].write() as db:
+        db.get(Participant, 1).consented_at -= timedelta(hours=5)
+    slow.answer(1)
+    person().begin()
+    assert numbers(app) == [1, 2]
+    with app.extensions["database"].write() as db:
+        for row in db.scalars(select(Response)):
+            row.answered_at -= timedelta(hours=5)
+    person().begin()
+    assert numbers(app) == [1, 2, 1]
+
+
+def test_lists_of_a_pilot_are_apart(app, person):
+    with app.extensions["database"].write() as db:
+        set_state(db, "pilot")
+    person().begin(), person().begin()
+    with app.extensions["database"].write() as db:
+        set_state(db, "open")
+    person().begin()
+    assert numbers(app) == [1, 2, 1]
+
+
+def test_participants_of_before_lists_hold_none(app, person):
+    person().begin()
+    change(app, 1, list_number=None)
+    person().begin()
+    assert numbers(app) == [None, 1]
+
+
+def test_some_of_the_pairs_each(tmp_path, write_study, person):
+    study = write_study(tmp_path / "some", assignment={"pairs": 15}, quality={"repeats": 2})
+    app = create_app(study)
+    Person = type(person())
+    somebody = Person(app)
+    assert "There are 17 questions" in somebody.get("/").text
+    somebody.begin().answer(*[1] * 17)
+    assert somebody.path == "/thanks"
+    for _ in range(3):
+        Person(app).begin()
+    with app.extensions["database"].read() as db:
+        main = db.execute(select(Trial.cell, Trial.left, Trial.right).where(Trial.kind == "main"))
+        asked = Counter((cell, frozenset(sides)) for cell, *sides in main)
+        assert len(asked) == 30 and {*asked.values()} == {2}
+        assert record_of(db).content and '"assignment": {"pairs": 15}' in record_of(db).content
+
+
+@pytest.mark.parametrize("assignment", [{"pairs": 31}, {"pairs": -1}, {"pair": 3}])
+def test_nonsense_is_refused(tmp_path, write_study, assignment):
+    with pytest.raises(InputError, match="assignment"):
+        create_app(write_study(tmp_path / "wrong", assignment=assignment))
+    with pytest.raises(InputError, match="half of a participant's pairs"):
+        create_app(write_study(tmp_path / "w", assignment={"pairs": 6}, quality={"repeats": 4}))
