@@ -82,7 +82,13 @@ def addresses(app, method):
         if method in rule.methods:
             sha256 = next(iter(app.extensions["study"].images_by_sha256))
             values = {"sha256": sha256, "filename": "style.css", "name": "report.html"}
-            values |= {"box": "0-0-64-36", "width": 64, "code": "P0001"}
+            values |= {
+                "box": "0-0-64-36",
+                "width": 64,
+                "code": "P0001",
+                "amplify": 2,
+                "reference": sha256,
+            }
             with app.test_request_context():
                 yield url_for(rule.endpoint, **{name: values[name] for name in rule.arguments})
 
