@@ -31,8 +31,6 @@ from stimuli.manifest import NAME as MANIFEST
 from stimuli.study import FRAMING
 
 CHUNK_ROWS = 500
-#: A simple reaction to a light takes about this long (Luce 1986, Response Times, ch. 2).
-FASTEST_MS = 200
 
 
 @dataclass(frozen=True)
@@ -104,10 +102,20 @@ COLUMNS = (
         "integer",
         "-2 to 2",
         (
-            "Which looks more realistic: -2 clearly left, -1 slightly left, 0 no difference "
-            "seen, 1 slightly right, 2 clearly right"
+            "Answer to the study's question, as the analysis counts it: -2 clearly left, -1 "
+            "slightly left, 0 no difference seen, 1 slightly right, 2 clearly right"
         ),
         lambda r: r.response.answer,
+    ),
+    Column(
+        "point",
+        "integer",
+        "-5 to 5",
+        (
+            "The point of the study's scale that was given; the codebook says as which answer each "
+            "counts. Empty: answered before it was recorded"
+        ),
+        lambda r: r.response.point,
     ),
     Column(
         "kind",
@@ -419,14 +427,14 @@ COLUMNS = (
         "text",
         "fast, impossible",
         (
-            f"fast: rt_ms is below {FASTEST_MS}, less than it takes to see and press; impossible: "
-            "see rt_reported_ms; else empty"
+            "fast: rt_ms is below `fastest_ms` of the study's [quality], by default 200: less than "
+            "it takes to see and press; impossible: see rt_reported_ms; else empty"
         ),
         lambda r: (
             "impossible"
             if r.response.rt_reported_ms is not None
             else "fast"
-            if r.response.rt_ms < FASTEST_MS
+            if r.response.rt_ms < r.study.definition.quality.fastest_ms
             else ""
         ),
     ),
@@ -652,7 +660,10 @@ def codebook_md(study: Study, *, simulated: bool) -> str:
         f"Question: {definition.question.text}",
         *_shown(study),
         "",
-        *(f"- answer {level.value}: {level.label}" for level in definition.scale),
+        *(
+            f"- point {point.value}, counts as answer {point.counts}: {point.label or '(no words)'}"
+            for point in definition.scale
+        ),
         *(
             f"- {factor.name} `{level.name}`: {level.label}"
             for factor in definition.factors

@@ -173,7 +173,8 @@ class Response(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     participant_id: Mapped[int] = mapped_column(ForeignKey("participants.id"))
     trial_id: Mapped[int] = mapped_column(ForeignKey("trials.id"), unique=True)
-    answer: Mapped[int]  # -2..2; negative: the left image looks more realistic
+    answer: Mapped[int]  # -2..2, as it counts; negative: the left image
+    point: Mapped[int | None]  # of the scale, -5..5, as it was given; None: before it was recorded
     rt_ms: Mapped[int]
     timed_by: Mapped[str] = mapped_column(String(7))  # browser | server
     times_shown: Mapped[int]

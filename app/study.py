@@ -14,8 +14,6 @@ from app.catalogues import catalogue, message
 from stimuli.manifest import Image, Manifest, load_manifest
 from stimuli.study import Study as Definition
 
-#: What most people take for a question: the thesis's 30 took 10 to 15 minutes.
-SECONDS_A_QUESTION = (20, 30)
 #: What app.models stores of a person, in words; tests hold it to the tables.
 RECORDED = (
     message("your self-rating"),
@@ -32,7 +30,7 @@ RECORDED = (
 def minutes(definition: Definition) -> tuple[int, int]:
     """How many minutes most people need, from and to."""
     low, high = (
-        max(1, round(definition.questions * seconds / 60)) for seconds in SECONDS_A_QUESTION
+        max(1, round(definition.questions * seconds / 60)) for seconds in definition.pages.seconds
     )
     return low, high
 

@@ -163,7 +163,7 @@ def style() -> Response:
     """
     opened, viewer = study(), study().definition.viewer
     rules = [f":root {{ --surround: rgb({viewer.surround} {viewer.surround} {viewer.surround}); "]
-    rules.append(f"--on-surround: {viewer.ink}; }}\n")
+    rules.append(f"--on-surround: {viewer.ink}; }}\n.pair {{ --gap: {viewer.gap}px; }}\n")
     for place, cell in enumerate(opened.cells):
         left, top, right, bottom = opened.image(cell, opened.techniques[0]).box
         ratio = (right - left) / (bottom - top)

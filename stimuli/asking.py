@@ -58,6 +58,9 @@ class Trap:
 class Quality:
     """How many questions of each further kind a participant is asked (see
     `analysis.manifest.KINDS`).
+
+    fastest_ms: quicker answers are flagged; a simple reaction to a light takes about 200 ms (Luce
+    1986, Response Times, ch. 2)
     """
 
     practice: int = 0
@@ -65,6 +68,7 @@ class Quality:
     swapped: int = 0
     bias: int = 0
     traps: tuple[Trap, ...] = ()
+    fastest_ms: int = 200
 
     @property
     def questions(self) -> int:
@@ -131,8 +135,9 @@ def read_quality(
         if any({*vars(one).values()} == {*vars(trap).values()} for one in traps):
             raise InputError(f"{entry.source}: {entry.key}: the same pair a second time")
         traps.append(trap)
+    fastest_ms = table.number("fastest_ms", 0, 60_000, default=Quality.fastest_ms)
     table.end()
-    return Quality(traps=tuple(traps), **counts)
+    return Quality(traps=tuple(traps), fastest_ms=fastest_ms, **counts)
 
 
 @dataclass(frozen=True)
@@ -203,11 +208,17 @@ class Pages:
     instructions    before the first question, on a page of their own
     debrief         after the last one
     break_every     so many questions are followed by a page that offers a rest; 0: none
+    seconds         that most people take for a question, from and to: the thesis's 30 took 10 to 15
+                    minutes; the consent's {minutes} follow from it
     """
 
     instructions: str = ""
     debrief: str = ""
     break_every: int = 0
+    seconds: tuple[int, int] = (20, 30)
+
+    def record(self) -> dict:
+        return {**vars(self), "seconds": list(self.seconds)}
 
 
 def read_asks(tables: list[Table], taken: Sequence[str]) -> tuple[Ask, ...]:
@@ -267,6 +278,17 @@ def read_pages(table: Table) -> Pages:
         table.text("instructions", default="") if table.value.get("instructions") else "",
         table.text("debrief", default="") if table.value.get("debrief") else "",
         table.number("break_every", 0, 1000, default=0),
+        tuple(
+            table.take(
+                "seconds",
+                list,
+                "[from, to] in whole seconds a question, 1 to 3600",
+                lambda v: (
+                    len(v) == 2 and all(type(s) is int for s in v) and 1 <= v[0] <= v[1] <= 3600
+                ),
+                default=list(Pages.seconds),
+            )
+        ),
     )
     for key in ("instructions", "debrief"):
         table.take(key, str, default="")

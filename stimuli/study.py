@@ -93,6 +93,7 @@ RESERVED = frozenset(
         "display_gamma",
         "dark_steps_seen",
         "bright_steps_seen",
+        "point",
         "reason_ticks",
         "reason_text",
         "language",
@@ -100,6 +101,8 @@ RESERVED = frozenset(
         "consent_sha256",
     }
 )
+#: Points of a scale at most, and up to how many all of them have words.
+LONGEST_SCALE, WORDED = 11, 5
 UNITS = ("mm", "cm", "m", "in")  # of a scan's coordinates
 AXES = ("y", "z")  # that can point upwards in a scan
 _WORDING = ("question", "scale", "familiarity", "consent")
@@ -168,10 +171,19 @@ class Question:
 
 @dataclass(frozen=True)
 class ScalePoint:
-    """One answer of the scale: -2 (strongly the left image) to 2 (strongly the right one)."""
+    """One answer of the scale: below 0 the left image, above 0 the right one, -5 to 5.
+
+    counts: the strength as which the analysis takes it, -2 (strongly the left image) to 2
+    label: "" where only the point's number stands
+    """
 
     value: int
     label: str
+    counts: int
+
+    def record(self) -> dict:
+        counts = {"counts": self.counts} if self.counts != self.value else {}
+        return {"value": self.value, "label": self.label, **counts}
 
 
 @dataclass(frozen=True)
@@ -277,6 +289,14 @@ class Study:
         return table
 
     @property
+    def strengths(self) -> dict[int, str]:
+        """The strengths of answers, from the left, with the labels of the points that count so."""
+        labels: dict[int, list[str]] = {}
+        for place, point in enumerate(self.scale, 1):
+            labels.setdefault(point.counts, []).append(point.label or str(place))
+        return {counts: " / ".join(texts) for counts, texts in labels.items()}
+
+    @property
     def own_texts(self) -> dict:
         """What people read of the study in its first language: the shape of the other languages'
         texts.
@@ -343,7 +363,7 @@ class Study:
             **({"cells": [cell.levels for cell in self.cells]} if listed else {}),
             "techniques": [{"name": t.name, "label": t.label} for t in self.techniques],
             "question": vars(self.question),
-            "scale": [vars(level) for level in self.scale],
+            "scale": [point.record() for point in self.scale],
             "familiarity": {
                 "question": self.familiarity.question,
                 "labels": list(self.familiarity.labels),
@@ -358,7 +378,7 @@ class Study:
             "before": [ask.record() for ask in self.before],
             "after": [ask.record() for ask in self.after],
             "reason": self.reason.record(),
-            "pages": vars(self.pages),
+            "pages": self.pages.record(),
             "screen": self.screen.record(),
             **({"analysis": self.analysis} if self.analysis else {}),
             **({"languages": list(self.languages)} if self.languages != ("en",) else {}),
@@ -628,8 +648,8 @@ def _question(table: Table) -> Question:
 
 
 def _scale(table: Table) -> tuple[ScalePoint, ...]:
-    levels = table.tables("scale", least=2, most=5)
-    values = [level.number("value", -2, 2) for level in levels]
+    levels = table.tables("scale", least=2, most=LONGEST_SCALE)
+    values = [level.number("value", -5, 5) for level in levels]
     if values != sorted({*values}) or values != [-value for value in reversed(values)]:
         raise table.fault(
             "scale",
@@ -637,11 +657,36 @@ def _scale(table: Table) -> tuple[ScalePoint, ...]:
             "values that ascend and are the same on both sides, such as -1, 1 for two alternatives "
             "or -2, -1, 0, 1, 2",
         )
-    scale = tuple(ScalePoint(level.value["value"], level.text("label")) for level in levels)
-    refuse_doubles(levels, "label")
+    fine = values[-1] > 2  # more steps than the analysis has strengths
+    counts = [
+        level.number("counts", -2, 2, **({} if fine else {"default": value}))
+        for level, value in zip(levels, values)
+    ]
+    signs = [(value > 0) - (value < 0) for value in values]
+    if (
+        counts != sorted(counts)
+        or counts != [-count for count in reversed(counts)]
+        or signs != [(count > 0) - (count < 0) for count in counts]
+    ):
+        raise table.fault(
+            "scale",
+            counts,
+            "`counts` that ascend, are the same on both sides and have their values' signs, such "
+            "as -2, -2, -1, 0, 1, 2, 2 for seven points",
+        )
+    ends = {0, len(levels) - 1}
+    if len(levels) <= WORDED:
+        ends = {*range(len(levels))}
+    labels = [
+        level.text("label") if k in ends else level.take("label", str, default="")
+        for k, level in enumerate(levels)
+    ]
+    for level, label in zip(levels, labels):
+        level.value = {**level.value, "label": label}
+    refuse_doubles([level for level, label in zip(levels, labels) if label.strip()], "label")
     for level in levels:
         level.end()
-    return scale
+    return tuple(map(ScalePoint, values, labels, counts))
 
 
 def _familiarity(table: Table) -> Familiarity:

@@ -49,6 +49,7 @@ class Viewer:
     scripts     "optional": without JavaScript the pair stands side by side, scaled by the browser,
                 and the answer is marked; "required": such a browser is told so and asked nothing;
                 boosted triplets require them
+    gap         between images that stand beside each other, CSS pixels
     reference   of triplets: the name of a condition, or "files": `references` of the manifest
     boost       of boosted triplets
     """
@@ -58,6 +59,7 @@ class Viewer:
     surround: int = 108
     zoom: int = 8
     scripts: str = OPTIONAL
+    gap: int = 8
     reference: str = ""
     boost: Boost | None = None
 
@@ -116,6 +118,7 @@ def read_viewer(
         surround=table.number("surround", 0, 255, default=108),
         zoom=table.number("zoom", 1, 1 if boosted else 16, default=1 if boosted else 8),
         scripts=table.one_of("scripts", scripts, default=scripts[0]),
+        gap=table.number("gap", 0, 400, default=Viewer.gap),
         reference=reference,
         boost=boost,
     )

@@ -282,7 +282,7 @@ def sides(db: Session, study: Study) -> dict[str, Any]:
             "right": sum(count for value, count in given.items() if value > 0),
         },
         "given": [
-            {"label": level.label, "count": given.get(level.value, 0)}
-            for level in study.definition.scale
+            {"label": label, "count": given.get(counts, 0)}
+            for counts, label in study.definition.strengths.items()
         ],
     }

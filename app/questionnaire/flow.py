@@ -74,6 +74,7 @@ class Answer:
     reason_ticks: str | None = None
     reason_text: str | None = None
     language: str | None = None
+    point: int | None = None
 
 
 def find(session: Session, visit: str | None, *, lock: bool = False) -> Participant | None:
@@ -265,17 +266,19 @@ def _answer(
     if asked.order is None or asked.withdrawn_at or asked.study_state == "closed":
         return Outcome.STALE, here
     if asked.answer is not None:
-        if asked.answer == given.value:
+        if asked.answer == given.value and asked.point in (None, given.point):
             return Outcome.REPEATED, here
-        refused = {
+        kept = asked.answer if asked.point is None else asked.point
+        refused = given.value if given.point is None else given.point
+        event = {
             "participant_id": asked.id,
             "trial_id": trial_id,
             "kind": "refused",
-            "detail": f"kept {asked.answer}, refused {given.value}",
+            "detail": f"kept {kept}, refused {refused}",
         }
-        if not connection.scalar(select(Event.id).filter_by(**refused).limit(1)):
+        if not connection.scalar(select(Event.id).filter_by(**event).limit(1)):
             # once: what is repeated without end is not stored without end
-            connection.execute(insert(Event.__table__), refused | {"at": now()})
+            connection.execute(insert(Event.__table__), event | {"at": now()})
         return Outcome.REFUSED, here
     images = (
         study.image(asked.cell, asked.left).sha256,
@@ -329,6 +332,7 @@ _ASKED = (
         Trial.left,
         Trial.right,
         Response.answer,
+        Response.point,
     )
     .outerjoin(Trial, (Trial.participant_id == Participant.id) & (Trial.id == bindparam("trial")))
     .outerjoin(Response, Response.trial_id == Trial.id)

@@ -301,16 +301,18 @@ def question():
 
 @blueprint.post("/question")
 def answer():
-    trial, value = _integer("trial", 1, 2**31 - 1), _integer("answer", -2, 2)
+    trial, value = _integer("trial", 1, 2**31 - 1), _integer("answer", -5, 5)
     if trial is None:
         abort(400, gettext("The form did not say which question it answers. Reload the page."))
-    if value not in (level.value for level in study().definition.scale):
+    point = next((one for one in study().definition.scale if one.value == value), None)
+    if point is None:
         if wants_json():
             abort(400, gettext("The form held no answer of the study's scale."))
         flash(gettext("Please choose one of the answers."))
         return redirect(url_for(".question"), 303)
     given = Answer(
-        value=value,
+        value=point.counts,
+        point=point.value,
         image_left_sha256=request.form.get("image_left", ""),
         image_right_sha256=request.form.get("image_right", ""),
         view=_view(),

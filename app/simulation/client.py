@@ -135,9 +135,11 @@ class Visitor:
                 order += 1
                 cell, left, right = self._seen(form)
                 answer, rt_ms = self._crowd.answer(number, order, cell, left, right)
-                values = [level.value for level in self._study.definition.scale]
                 # of a scale without it, 'no difference' goes to either side
-                answer = min(values, key=lambda v: (abs(v - answer), (v < 0) == (rt_ms % 2 == 0)))
+                answer = min(
+                    self._study.definition.scale,
+                    key=lambda p: (abs(p.counts - answer), (p.value < 0) == (rt_ms % 2 == 0)),
+                ).value
                 page = self._send(http, page, "trial", answer=answer, rt_ms=rt_ms, **WINDOW)
                 page = self._between(http, page, number)
                 yield order

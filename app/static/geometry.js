@@ -2,7 +2,7 @@
 // A scale is screen pixels an image pixel: a whole number, or FIT, which is as large as the room allows.
 
 export const FIT = "fit";
-export const GAP = 8, HANDLE = 28; // CSS pixels between the images, and below one for the divider's handle
+export const HANDLE = 28; // CSS pixels below an image for the divider's handle
 const STEP = 16, LARGEST = 8192; // as app/renditions.py makes them
 
 // Height of a box at a width, as the server rounds it.

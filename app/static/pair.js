@@ -1,7 +1,7 @@
 // The pair viewer: both images in whole device pixels, resampled by nobody here, side by side or in one place, with one
 // zoom and one place for both. What is asked of a canvas is a whole number of pixels copied to whole pixels.
 
-import { FIT, GAP, HANDLE, heightOf, place, scales } from "./geometry.js";
+import { FIT, HANDLE, heightOf, place, scales } from "./geometry.js";
 import { pictures } from "./pictures.js";
 
 const PAN_KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -353,7 +353,7 @@ export function roomOf(pair) {
   const x = Math.ceil(left * ratio), y = Math.ceil(top * ratio);
   const caption = Math.ceil(pair.querySelector("figcaption").offsetHeight * ratio);
   return { ratio, x, y, left: left * ratio, top: top * ratio, across: Math.floor(right * ratio) - x, down: Math.floor(bottom * ratio) - y,
-    caption, below: Math.ceil(HANDLE * ratio), gap: Math.round(GAP * ratio) };
+    caption, below: Math.ceil(HANDLE * ratio), gap: Math.round(Number(pair.dataset.gap) * ratio) };
 }
 
 const clamp = (value, low, high) => (high < low ? (low + high) / 2 : Math.max(low, Math.min(high, value)));

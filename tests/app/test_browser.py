@@ -703,7 +703,12 @@ def test_boosted_images_take_turns_with_the_reference_unless_that_is_stopped(
 
     boost = {"flicker_hz": 5, "amplify": 2}
     viewer = {"modes": ["boosted"], "reference": "golubev", "boost": boost}
-    app = create_app(write_study(tmp_path / "study", size=(320, 180), viewer=viewer))
+    words = {1: "B", -5: "Clearly A", 5: "Clearly B"}
+    scale = [
+        {"value": v, "label": words.get(v, ""), "counts": (v > 0) - (v < 0)} for v in range(-5, 6)
+    ]
+    study_dir = write_study(tmp_path / "study", size=(320, 180), viewer=viewer, scale=scale)
+    app = create_app(study_dir)
     look = """async (frames) => {
       const canvases = [...document.querySelectorAll(".pair canvas")], seen = [];
       const reader = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
@@ -751,11 +756,15 @@ def test_boosted_images_take_turns_with_the_reference_unless_that_is_stopped(
         page.set_viewport_size({"width": 390, "height": 844})
         boxes = [one.bounding_box() for one in page.locator(".pair canvas").all()]
         assert len({box["x"] for box in boxes}) == 1 and boxes[0]["y"] < boxes[1]["y"]
+        expect(page.locator(".ends")).to_be_visible()
+        assert page.get_by_role("radio", name="Clearly B").count() == 1
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert Axe().run(page, options=RULES).response["violations"] == []
         page.keyboard.press("4")
         page.keyboard.press("Enter")
         shown(page, 2)
     ((_, row),) = stored(app)
     assert row.view == "boosted" and row.pixel_scale == 2
+    assert (row.point, row.answer) == (-2, -1)
     assert row.boosted_ms == pytest.approx(row.rt_ms - row.away_ms, abs=2)
     assert 2 <= row.flips <= 2 * 5 * row.rt_ms / 1000 + 2

@@ -165,7 +165,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path, write_study, changes, error):
 #: Every column about a participant: by which words of the consent, or why no words are needed.
 STORED = {
     "your self-rating": "familiarity",
-    "your answers": "answer reason_ticks reason_text image_left_sha256 image_right_sha256",
+    "your answers": "answer point reason_ticks reason_text image_left_sha256 image_right_sha256",
     "the times at which you began, answered and ended": "consented_at answered_at started_at "
     "completed_at withdrawn_at rt_ms timed_by rt_server_ms rt_reported_ms at",
     "how often a question was opened": "times_shown",

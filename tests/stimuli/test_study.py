@@ -252,7 +252,7 @@ def test_consent_knows_its_placeholders(write_toml):
             '[question]\ntext = "?"\nleft_label = "A"\n[render]',
             r"question\.right_label: missing",
         ),
-        ("[render]", "scale = 5\n[render]", r"scale: got 5, expected a list of 2 to 5 tables"),
+        ("[render]", "scale = 5\n[render]", r"scale: got 5, expected a list of 2 to 11 tables"),
         (
             "[render]",
             "scale = ["
