@@ -20,11 +20,11 @@ from scipy import special, stats
 
 #: Standard deviation of a difference in JOD: Phi(1 / JOD_SIGMA) = 0.75.
 JOD_SIGMA = 1 / stats.norm.ppf(0.75)
-#: Newton's method stops at steps below the first, and gives up after so many or where a worth
-#: passes the last (logits, probits);
+#: Newton's method stops after a step below the first, since what is left then is about its square
+#: (1e-12), and gives up after so many or where a worth passes the last (logits, probits);
 #: a slope at the last is still far above rounding, so that no flight to infinity is taken for an
 #: end.
-STEP, ITERATIONS, FARTHEST = 1e-9, 60, 20.0
+STEP, ITERATIONS, FARTHEST = 1e-6, 60, 20.0
 #: Fisher scoring with an adjusted score converges linearly and takes more steps.
 SCORING_STEP, SCORING_ITERATIONS = 1e-8, 300
 #: Added to the diagonal of an information, as a share of its mean, so that one that runs flat can
@@ -166,23 +166,28 @@ def _newton(x: np.ndarray, over: np.ndarray, under: np.ndarray, link: Link) -> n
     0, NaN where none is found.
     """
 
-    def step(w: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        slope, curvature = link.observed(w @ x.T, over[rows], under[rows])
+    def step(w: np.ndarray, over, under) -> np.ndarray:
+        slope, curvature = link.observed(w @ x.T, over, under)
         return solved(blind_filled((curvature @ outer).reshape(-1, n, n)), slope @ x)
 
     n = x.shape[1]
     outer = (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
-    w = climbed(np.zeros((len(over), n)), step, STEP, ITERATIONS)
+    w = climbed(_origin(n), step, (over, under), STEP, ITERATIONS)
     return w - w.mean(axis=1, keepdims=True)
+
+
+def _origin(n: int) -> Callable[..., np.ndarray]:
+    """Where a climb begins that knows nothing: all worths 0."""
+    return lambda over, under: np.zeros((len(over), n))
 
 
 def _scored(x: np.ndarray, over: np.ndarray, under: np.ndarray, link: Link) -> np.ndarray:
     """The same with the score adjusted for bias, by Fisher scoring (Kosmidis and Firth 2009)."""
 
-    def step(w: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    def step(w: np.ndarray, over, under) -> np.ndarray:
         d = w @ x.T
-        slope, _ = link.observed(d, over[rows], under[rows])
-        weight = total[rows] * link.information(d)
+        slope, _ = link.observed(d, over, under)
+        weight = (over + under) * link.information(d)
         information = blind_filled((weight @ outer).reshape(-1, n, n))
         # h_k = weight_k x_k' I^-1 x_k; the common shift that was filled in is orthogonal to x_k
         leverage = weight * np.einsum(
@@ -190,31 +195,46 @@ def _scored(x: np.ndarray, over: np.ndarray, under: np.ndarray, link: Link) -> n
         )
         return solved(information, (slope + 0.5 * leverage * link.bend(d)) @ x)
 
-    n, total = x.shape[1], over + under
+    n = x.shape[1]
     outer = (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
-    w = climbed(np.zeros((len(over), n)), step, SCORING_STEP, SCORING_ITERATIONS)
+    w = climbed(_origin(n), step, (over, under), SCORING_STEP, SCORING_ITERATIONS)
     return w - w.mean(axis=1, keepdims=True)
 
 
 def climbed(
-    theta: np.ndarray,
-    step: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    start: Callable[..., np.ndarray],
+    step: Callable[..., np.ndarray],
+    counts: tuple[np.ndarray, ...],
     least: float,
     iterations: int,
 ) -> np.ndarray:
-    """theta (R, m) after steps of at most 2 until they are below `least`; NaN where that does not
-    come, or a parameter passes `FARTHEST`. step: parameters (r, m), their rows -> steps (r, m).
+    """Parameters (R, m) that climb by steps of at most 2 until they are below `least`; NaN where
+    that does not come, or a parameter passes `FARTHEST`.
+
+    counts          (R, ...) each, what was answered
+    start(*counts)  (r, m), where it begins
+    step(theta, *counts)  (r, m), one step of these rows
+    Many tables begin where their sum ends, which for resamples of one study is near all of them.
     """
-    active = np.arange(len(theta))
+    theta = start(*counts)
+    if len(theta) > 1:
+        pooled = climbed(
+            start, step, tuple(one.sum(axis=0, keepdims=True) for one in counts), least, iterations
+        )
+        if np.isfinite(pooled).all():
+            theta = np.repeat(pooled, len(theta), axis=0)
+    active, here = np.arange(len(theta)), counts
     for _ in range(iterations):
-        taken = step(theta[active], active)
+        taken = step(theta[active], *here)
         length = np.abs(taken).max(axis=1)
         theta[active] += taken * np.minimum(1, 2 / np.maximum(length, 1e-300))[:, None]
         astray = ~(np.abs(theta[active]).max(axis=1) < FARTHEST)
         theta[active[astray]] = np.nan
-        active = active[(length > least) & ~astray]
-        if not len(active):
-            break
+        going = (length > least) & ~astray
+        if not going.any():
+            return theta
+        if not going.all():
+            active, here = active[going], tuple(one[going] for one in here)
     theta[active] = np.nan
     return theta
 

@@ -46,51 +46,69 @@ def davidson(
     shape, n = wins.shape[:-1], wins.shape[-1]
     wins, ties = wins.reshape(-1, n, n), ties.reshape(-1, n, n)
     i, j = np.triu_indices(n, 1)
-    counts = np.stack([wins[:, i, j], wins[:, j, i], ties[:, i, j]], axis=-1)
+    over, under, level = wins[:, i, j], wins[:, j, i], ties[:, i, j]
     worth, log_nu = np.full((len(wins), n), np.nan), np.full(len(wins), np.nan)
-    without = counts[..., 2].sum(axis=1) == 0
+    without = level.sum(axis=1) == 0
     if without.any():
         worth[without] = bradley_terry(wins[without], reduced_bias)
         log_nu[without & np.isfinite(worth[:, 0])] = -np.inf
     met = wins + ties
     met = met + np.swapaxes(met, 1, 2) if reduced_bias else met
-    exists = ~without & connected(met) & (counts[..., :2].sum(axis=(1, 2)) > 0)
+    exists = ~without & connected(met) & ((over + under).sum(axis=1) > 0)
     if n > 1 and exists.any():
-        worth[exists], log_nu[exists] = _climb(differences(n), counts[exists], reduced_bias)
+        counts = tuple(one[exists] for one in (over, under, level))
+        worth[exists], log_nu[exists] = _climb(differences(n), counts, reduced_bias)
     return worth.reshape(shape), log_nu.reshape(shape[:-1])
 
 
-def _climb(x: np.ndarray, counts: np.ndarray, reduced_bias: bool) -> tuple[np.ndarray, np.ndarray]:
-    """x (K, n), counts (R, K, 3) -> worths (R, n) and log nu (R,)."""
-    n, total = x.shape[1], counts.sum(axis=2)
+def _climb(
+    x: np.ndarray, counts: tuple[np.ndarray, ...], reduced_bias: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """x (K, n); counts: how often i was preferred, j, neither, (R, K) each -> worths (R, n) and log
+    nu (R,).
+    """
+    n = x.shape[1]
     outer = (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
-    theta = np.zeros((len(counts), n + 1))
-    decided = counts[..., :2].sum(axis=(1, 2))
-    theta[:, n] = np.log(2 * counts[..., 2].sum(axis=1) / decided)
 
-    def step(theta: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        m, seen = total[rows], counts[rows]
-        # Divided by sqrt(pi_i pi_j) the three outcomes weigh e^(d/2), e^(-d/2) and nu.
-        d = theta[:, :n] @ x.T
-        level = np.broadcast_to(theta[:, n:], d.shape)
-        p = special.softmax(np.stack([d / 2, -d / 2, level], axis=-1), axis=-1)  # (r, K, 3)
-        mean = p @ FEATURES  # (r, K, 2): the lean and the share of ties
-        score = seen @ FEATURES - m[..., None] * mean
-        information = _information(x, outer, m, mean)
+    def step(theta: np.ndarray, over, under, level) -> np.ndarray:
+        m = over + under + level
+        p = _outcomes(theta[:, :n] @ x.T, theta[:, n:])
+        lean, tie = (p[0] - p[1]) / 2, p[2]
+        score = (over - under) / 2 - m * lean, level - m * tie
+        information = _information(x, outer, m, lean, tie)
         if reduced_bias:
-            score = score + _third_cumulants(x, information, m, p, mean)
-        slope = np.concatenate([score[..., 0] @ x, score[..., 1].sum(axis=1)[:, None]], axis=1)
+            added = _third_cumulants(x, information, m, np.stack(p, axis=-1))
+            score = score[0] + added[..., 0], score[1] + added[..., 1]
+        slope = np.concatenate([score[0] @ x, score[1].sum(axis=1)[:, None]], axis=1)
         return solved(information, slope)
 
+    def start(over, under, level) -> np.ndarray:
+        theta = np.zeros((len(over), n + 1))
+        theta[:, n] = np.log(2 * level.sum(axis=1) / (over + under).sum(axis=1))
+        return theta
+
     least, most = (SCORING_STEP, SCORING_ITERATIONS) if reduced_bias else (STEP, ITERATIONS)
-    theta = climbed(theta, step, least, most)
+    theta = climbed(start, step, counts, least, most)
     return theta[:, :n] - theta[:, :n].mean(axis=1, keepdims=True), theta[:, n]
 
 
-def _information(x: np.ndarray, outer: np.ndarray, m: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """(r, n + 1, n + 1): the covariance of the outcomes' features, over all pairs."""
+def _outcomes(d: np.ndarray, log_nu: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The probabilities of i, of j and of no difference. d is within twice `FARTHEST`, so that
+    nothing overflows.
+    """
+    up, nu = np.exp(d / 2), np.exp(log_nu)  # divided by sqrt(pi_i pi_j) they weigh up, 1/up, nu
+    down = 1 / up
+    total = up + down + nu
+    return up / total, down / total, nu / total
+
+
+def _information(
+    x: np.ndarray, outer: np.ndarray, m: np.ndarray, lean: np.ndarray, tie: np.ndarray
+) -> np.ndarray:
+    """(r, n + 1, n + 1): the covariance of the outcomes' features, over all pairs; lean and tie
+    (r, K) are their means.
+    """
     n = x.shape[1]
-    lean, tie = mean[..., 0], mean[..., 1]
     information = np.empty((len(m), n + 1, n + 1))
     information[:, :n, :n] = ((m * ((1 - tie) / 4 - lean**2)) @ outer).reshape(-1, n, n)
     information[:, :n, n] = information[:, n, :n] = -(m * lean * tie) @ x
@@ -111,25 +129,23 @@ def davidson_covariance(wins: np.ndarray, ties: np.ndarray, reduced_bias: bool) 
     if not np.isfinite(worth).all():
         return np.full((n, n), np.nan)
     x = differences(n)
-    d = x @ worth
-    logits = np.stack([d / 2, -d / 2, np.full_like(d, log_nu)], axis=-1)
-    p = special.softmax(logits, axis=-1)[None]
+    p = _outcomes(x @ worth, log_nu)
     total = (wins[i, j] + wins[j, i] + ties[i, j])[None]
     outer = (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
-    information = _information(x, outer, total, p @ FEATURES)[0]
+    information = _information(x, outer, total, (p[0] - p[1])[None] / 2, p[2][None])[0]
     centred = np.eye(n) - 1 / n
     return centred @ np.linalg.inv(information)[:n, :n] @ centred
 
 
 def _third_cumulants(
-    x: np.ndarray, information: np.ndarray, m: np.ndarray, p: np.ndarray, mean: np.ndarray
+    x: np.ndarray, information: np.ndarray, m: np.ndarray, p: np.ndarray
 ) -> np.ndarray:
     """(r, K, 2): what Jeffreys' prior adds to the score of each pair's features."""
     places = np.zeros((len(x), 2, x.shape[1] + 1))  # theta -> (d, log nu) of each pair
     places[:, 0, :-1], places[:, 1, -1] = x, 1
     inverse = np.linalg.inv(information)
     spread = np.einsum("kai,rij,kbj->rkab", places, inverse, places, optimize=True)
-    away = FEATURES - mean[..., None, :]  # (r, K, 3, 2)
+    away = FEATURES - (p @ FEATURES)[..., None, :]  # (r, K, 3, 2)
     size = np.einsum("rkoa,rkab,rkob->rko", away, spread, away, optimize=True)
     return 0.5 * m[..., None] * np.einsum("rko,rkoc->rkc", p * size, away)
 

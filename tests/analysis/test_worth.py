@@ -160,6 +160,24 @@ def test_many_matrices_at_once_are_as_one_by_one():
         assert np.isnan(together).any(axis=1).sum() < 50
 
 
+@pytest.mark.parametrize("reduced", [False, True])
+def test_tables_that_contradict_each_other_are_fitted_at_once_as_one_by_one(reduced):
+    """Many tables begin where their sum ends, which here is far from most of them."""
+    expected = special.expit(np.subtract.outer([2.5, 0, -2.5], [2.5, 0, -2.5]))
+    strong = np.rint(400 * expected * (1 - np.eye(3)))
+    won = np.stack([strong, strong.T, strong, strong.T[::-1, ::-1], np.ones((3, 3)) - np.eye(3)])
+    won[2] *= 1000
+    level = np.broadcast_to(5.0 * (1 - np.eye(3)), won.shape)
+    at_once, log_nu = davidson(won, level, reduced)
+    for k in range(len(won)):
+        one, its_nu = davidson(won[k], level[k], reduced)
+        assert at_once[k] == pytest.approx(one, abs=1e-7)
+        assert log_nu[k] == pytest.approx(its_nu, abs=1e-7)
+        for solve in (bradley_terry, thurstone_jod):
+            assert solve(won, reduced)[k] == pytest.approx(solve(won[k], reduced), abs=1e-7)
+    assert np.isfinite(at_once).all() and np.ptp(at_once[:, 0]) > 4
+
+
 def test_ordinal_without_people_is_an_ordered_logit_of_answers_seen_from_both_sides(crowd):
     """Each answer twice, once mirrored, makes the thresholds of statsmodels' model symmetric and
     the side effect 0.
