@@ -31,6 +31,9 @@ QUADRATURE_ITEMS, POINTS = 3, 5
 #: Standard deviations of the priors of a worth, of a log increment of the thresholds, and of the
 #: two spreads, logits: wide beside what is found where the likelihood has a maximum.
 PRIOR = (3.0, 2.0, 2.0)
+#: With twice as many people or more a climb begins at the fit of so many of them, and with its
+#: curvature an answer, at least the second in every direction.
+SOME_PEOPLE, LEAST_CURVATURE = 200, 1e-3
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ def ordinal(panel: Panel, mixed: bool = True, prior: bool = False) -> Ordinal | 
     is found.
     """
     problem = Likelihood(panel, mixed, prior)
-    theta = _climb(problem, problem.start())
+    theta = _climb(problem, *_beginning(panel, problem))
     few = len(panel.items) <= QUADRATURE_ITEMS and answers_each(panel) <= FEW_ANSWERS
     if theta is not None and mixed and few:
         laplace = problem
@@ -90,11 +93,31 @@ def ordinal(panel: Panel, mixed: bool = True, prior: bool = False) -> Ordinal | 
     return None if theta is None else problem.result(theta)
 
 
-def _climb(problem: Likelihood, start: np.ndarray) -> np.ndarray | None:
+def _beginning(panel: Panel, problem: Likelihood) -> tuple[np.ndarray, np.ndarray | None]:
+    """Where the climb begins, and the inverse curvature there where it is known: with many people
+    the fit of some of them, spread over the table, who gave all categories.
+    """
+    rows = np.flatnonzero(panel.answered.any(axis=1))
+    if len(rows) < 2 * SOME_PEOPLE:
+        return problem.start(), None
+    some = Likelihood(panel.chosen(rows[:: len(rows) // SOME_PEOPLE]), problem.mixed, problem.prior)
+    theta = _climb(some, some.start()) if some.m == problem.m else None
+    if theta is None:
+        return problem.start(), None
+    curvature = some.information(theta)
+    if problem.mixed:  # at a spread of 0 the slope is 0, whatever lies beside it
+        theta[-2:] = np.maximum(np.abs(theta[-2:]), 0.2)
+    values, vectors = np.linalg.eigh(curvature)
+    inverse = (vectors / np.maximum(np.abs(values), LEAST_CURVATURE)) @ vectors.T
+    return theta, (inverse + inverse.T) / 2
+
+
+def _climb(
+    problem: Likelihood, start: np.ndarray, inverse: np.ndarray | None = None
+) -> np.ndarray | None:
     """The parameters at the maximum: BFGS, then Newton's steps; None where none is found."""
-    theta = optimize.minimize(
-        problem, start, jac=True, method="BFGS", options={"gtol": 10 * problem.flat, "maxiter": 300}
-    ).x
+    options = {"gtol": 10 * problem.flat, "maxiter": 300, "hess_inv0": inverse}
+    theta = optimize.minimize(problem, start, jac=True, method="BFGS", options=options).x
     for _ in range(4):
         value, slope = problem(theta)
         if np.abs(slope).max() < problem.flat:

@@ -230,6 +230,17 @@ def test_the_gradient_of_the_ordinal_likelihood_is_its_derivative(crowd):
     assert slope == pytest.approx(numeric, abs=1e-8)
 
 
+def test_the_fit_of_many_people_is_that_of_a_climb_from_nothing(crowd):
+    """With many people the climb begins at the fit of some of them."""
+    panel = crowd(420, [0, 0.4, 1.2, 1.0], seed=4, taste=0.4)
+    one, problem = ordinal(panel), Likelihood(panel, True)
+    value, slope = problem(
+        optimize.minimize(problem, problem.start(), jac=True, options={"gtol": 1e-7}).x
+    )
+    assert one.log_likelihood == pytest.approx(-value * problem.answers, abs=1e-5)
+    assert np.abs(slope).max() < 1e-6
+
+
 def test_laplace_is_near_the_integral(crowd):
     """Three techniques: a taste of two dimensions and a leaning, by 30 x 30 x 30 Gauss-Hermite
     points.
