@@ -29,6 +29,7 @@ from renderer.techniques.drawing import result
 from renderer.techniques.samples import Body, Samples
 
 TABLE = 512  # texels of a profile along the distance, 256 to 512 in Rohat 2012, sec. 5.1
+FARTHEST_MM = 1e6  # a depth without an end
 HARMONICS_MAP = 64  # rows of the map that is projected
 #: What the points of one run add up: near light and their number, near light of light of 1, far
 #: light.
@@ -268,14 +269,13 @@ class PointsTechnique(Technique):
             only_irradiance=self.transmission is None,
             light="lamps" if even and light == "all" else "none" if even else light,
         )
-        deep = np.minimum(samples.depth_mm[own], tables.thickness_mm[-1] / self.thickness_scale)
-        inside = deep if tables.deep else np.zeros(len(own))
-        columns = (
-            samples.area_mm2[own],
-            inside,
-            tables.rows(self.thickness_scale * deep),
-            np.zeros(len(own)),
+        last, depth = tables.thickness_mm[-1], np.minimum(samples.depth_mm[own], FARTHEST_MM)
+        deep = np.minimum(self.thickness_scale * depth, last)
+        # what lies in between does not count; farther than the table goes nothing comes through
+        inside = (
+            np.where(self.thickness_scale * depth < last, depth, 0) if tables.deep else 0 * depth
         )
+        columns = (samples.area_mm2[own], inside, tables.rows(deep), np.zeros(len(own)))
         data = np.zeros((points.size[0] * points.size[1], 4), np.float32)
         data[: len(own)] = np.column_stack(columns)
         about = gl.Texture(

@@ -240,11 +240,12 @@ def test_lamps_and_the_environment_add_up():
 
 def test_a_mediums_lengths_and_thicknesses_are_scaled_at_run_time():
     """Half as thick a sheet of a medium of half its lengths sends the same through; thickness_scale
-    makes 2 mm act as 4."""
+    makes 2 mm act as 4, or everything as the thinnest part."""
     cases = {
         "whole": (4.0, {}),
         "smaller": (2.0, {"medium_scale": 0.5}),
         "stretched": (2.0, {"thickness_scale": 2.0}),
+        "thinnest": (4.0, {"thickness_scale": 0.0}),
     }
     got = {}
     for name, (thickness, parameters) in cases.items():
@@ -254,6 +255,7 @@ def test_a_mediums_lengths_and_thicknesses_are_scaled_at_run_time():
         got[name] = light.mean(axis=(0, 1))
     np.testing.assert_allclose(got["smaller"], got["whole"], rtol=0.08)
     np.testing.assert_allclose(got["stretched"], got["whole"], rtol=0.1)
+    assert (got["thinnest"] > 2 * got["whole"]).all() and np.isfinite(got["thinnest"]).all()
 
 
 def test_nine_harmonics_give_points_the_environments_light():
