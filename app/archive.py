@@ -30,6 +30,8 @@ from stimuli.manifest import NAME as MANIFEST
 FORMAT = "subdermal-archive/1"
 ABOUT = "archive.json"
 CHUNK_ROWS = 500
+#: Tables that every archive has.
+_OLDEST = {"study", "participants", "trials", "responses", "statements", "events", "log"}
 TABLES = tuple(table for table in Base.metadata.sorted_tables if table is not Live.__table__)
 
 
@@ -86,7 +88,9 @@ def read(path: Path, directory: Path, database_url: str | None) -> dict[str, int
 def _about(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     try:
         about = json.loads(archive.read(ABOUT))
-        known = about["format"] == FORMAT and about["tables"].keys() == {t.name for t in TABLES}
+        known = about["format"] == FORMAT and _OLDEST <= about["tables"].keys() <= {
+            t.name for t in TABLES
+        }
     except (KeyError, TypeError, ValueError):
         known = False
     if not known:
@@ -120,6 +124,8 @@ def _fill(archive: zipfile.ZipFile, path: Path, about: dict, url: str) -> None:
             if taken:
                 raise InputError(f"{shown}: has {', '.join(taken)} already; expected an empty one")
             for table in TABLES:
+                if table.name not in about["tables"]:
+                    continue  # the archive is of before there was such a table
                 member = f"tables/{table.name}.jsonl"
                 if _digest(_member(archive, path, member)) != about["tables"][table.name]["sha256"]:
                     raise InputError(f"{path}: the table {table.name} is damaged")

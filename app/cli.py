@@ -14,6 +14,7 @@ VERBS = {
     "strip": "app.commands.strip",
     "power": "app.commands.power",
     "serve": "app.commands.serve",
+    "links": "app.commands.links",
     "simulate": "app.commands.simulate",
     "archive": "app.commands.archive",
     "restore": "app.commands.restore",

@@ -23,7 +23,7 @@ from sqlalchemy.orm import Session, selectinload
 from analysis.files import replacing
 from analysis.manifest import KINDS
 from app import recruiting
-from app.models import Participant, Response, Trial
+from app.models import Link, Participant, Response, Trial
 from app.questionnaire import screen
 from app.study import Study
 from stimuli.asking import Ask
@@ -630,6 +630,26 @@ def recruits_csv(session: Session, study: Study) -> Iterator[str]:
     )
     header = (*names, "completion_code", "completed", "withdrawn", "excluded")
     return _csv(header, rows)
+
+
+def links_csv(session: Session) -> Iterator[str]:
+    """links.csv: single-use links and what became of each; not whose answers are whose."""
+    rows = session.execute(select(Link, Participant).outerjoin(Participant).order_by(Link.id))
+    return _csv(
+        ("link", "label", "made_on", "state"),
+        (
+            (link.token, link.label, link.made_at.date().isoformat(), _state(person))
+            for link, person in rows
+        ),
+    )
+
+
+def _state(person: Participant | None) -> str:
+    if person is None:
+        return "unused"
+    if person.withdrawn_at:
+        return "withdrawn"
+    return "completed" if person.completed_at else "begun"
 
 
 def codebook_csv(study: Study) -> Iterator[str]:

@@ -88,6 +88,8 @@ class StudyRecord(Base):
     state: Mapped[str] = mapped_column(String(6), default="open")  # of app.recruiting.STATES
     quota: Mapped[int | None]  # complete participants that are wanted
     reservation_minutes: Mapped[int] = mapped_column(default=120)
+    # whether only single-use links let somebody begin
+    links_only: Mapped[bool] = mapped_column(default=False)
     created_at: Mapped[datetime] = mapped_column(default=now)
 
     __table_args__ = (
@@ -253,6 +255,18 @@ class Event(Base):
 
 
 Index(None, Event.participant_id, Event.trial_id, Event.kind)
+
+
+class Link(Base):
+    """A link that lets one person begin; spent in the transaction that enrols them."""
+
+    __tablename__ = "links"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    token: Mapped[str] = mapped_column(String(16), unique=True)
+    label: Mapped[str] = mapped_column(String(100))  # for whom, in the researcher's words
+    made_at: Mapped[datetime] = mapped_column(default=now)
+    participant_id: Mapped[int | None] = mapped_column(ForeignKey("participants.id"), unique=True)
 
 
 class LogEntry(Base):

@@ -6,6 +6,7 @@ time of a reservation. Whether there is one, and taking it, is one transaction.
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping
 from datetime import timedelta
 from enum import Enum
@@ -14,11 +15,13 @@ from sqlalchemy import and_, func, or_, select
 from sqlalchemy.orm import Session
 
 from app.catalogues import message
-from app.models import LogEntry, Participant, Response, StudyRecord, now
+from app.models import Link, LogEntry, Participant, Response, StudyRecord, now, plain_code
 from app.study import Study
 
 #: Of what a recruiter's link says, characters of each parameter.
 LONGEST = 100
+#: No letters or digits that look alike.
+ALPHABET = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 #: States of a study, with what they mean to participants.
 STATES = {
     "draft": "nobody can begin, but who is logged in to the dashboard",
@@ -42,6 +45,10 @@ class Door(Enum):
         "code that it gave you."
     )
     STRANGER = message("Please come by the link that you were given: it says who is to be paid.")
+    UNINVITED = message("Please come by the link that you were given.")
+    SPENT = message(
+        "This link was used already: it is for one person. Go on in the browser in which you began."
+    )
 
 
 def record_of(session: Session, *, lock: bool = False) -> StudyRecord:
@@ -74,6 +81,33 @@ def admission(session: Session, study: Study, fields: Mapping[str, str]) -> Door
     who = fields.get(recruiting.parameters[0]) if recruiting.parameters else None
     query = select(Participant.id).where(Participant.recruit_id == who).limit(1)
     return Door.AGAIN if who and session.scalar(query) else Door.OPEN
+
+
+def make_links(session: Session, count: int, label: str) -> list[str]:
+    """New single-use links, by their tokens."""
+    tokens = ["".join(secrets.choice(ALPHABET) for _ in range(16)) for _ in range(count)]
+    session.add_all(Link(token=token, label=label[:100]) for token in tokens)
+    note(session, "links", f"{count} made{': ' if label else ''}{label[:100]}")
+    return tokens
+
+
+def set_links_only(session: Session, only: bool) -> None:
+    record = record_of(session, lock=True)
+    if record.links_only != only:
+        note(session, "links", "needed to begin" if only else "not needed to begin")
+        record.links_only = only
+
+
+def invitation(session: Session, record: StudyRecord, token: str | None) -> Link | Door | None:
+    """The unspent link of a token, or the door for whom it does not let in; None where nobody
+    needs one. Spend it in the transaction in which `record` was locked.
+    """
+    if token is None:
+        return Door.UNINVITED if record.links_only else None
+    link = session.scalar(select(Link).where(Link.token == plain_code(token)))
+    if link is None:
+        return Door.UNINVITED
+    return link if link.participant_id is None else Door.SPENT
 
 
 def places(session: Session, record: StudyRecord) -> int:

@@ -226,6 +226,32 @@ def quota():
     return redirect(url_for(".index"), 303)
 
 
+@blueprint.post("/links")
+def links():
+    """Make single-use links, or say whether they are needed."""
+    count, label = request.form.get("count", "").strip(), request.form.get("label", "").strip()
+    only = request.form.get("only")
+    if only in ("yes", "no"):
+        with database().write() as db:
+            recruiting.set_links_only(db, only == "yes")
+        return redirect(url_for(".index"), 303)
+    if not re.fullmatch(r"[1-9][0-9]{0,3}", count):
+        flash("How many links is a whole number from 1 to 9999.")
+        return redirect(url_for(".index"), 303)
+    with database().write() as db:
+        recruiting.make_links(db, int(count), label)
+    flash(f"{count} links were made; links.csv has them: put each behind /?link=.")
+    return redirect(url_for(".index"), 303)
+
+
+@blueprint.get("/links.csv")
+def links_csv():
+    """Single-use links and whether each was used; without a word of the answers."""
+    with database().read() as db:
+        body = "".join(export.links_csv(db))
+    return _download(body, "links.csv")
+
+
 @blueprint.get("/log.csv")
 def log_csv():
     """What was done here: states, quotas, exclusions with their reasons."""

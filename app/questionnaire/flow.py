@@ -26,8 +26,7 @@ from app.models import Event, Participant, Response, Statement, Trial, now, plai
 from app.recruiting import Door
 from app.study import Study
 
-#: No letters or digits that look alike; 10 of them are 48 bits.
-CODE_ALPHABET = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
+#: Of `recruiting.ALPHABET`: 48 bits.
 CODE_LENGTH = 10
 #: So much longer than by the server's clock a browser's may say that an answer took.
 CLOCKS_APART_MS = 1000
@@ -107,12 +106,14 @@ def enrol(
     *,
     insider: bool = False,
     link_fields: Mapping[str, str] = EMPTY,
+    token: str | None = None,
     consent: tuple[str, str] | tuple[None, None] = (None, None),
 ) -> Participant | Door:
     """The participant of a visit, with the trials assigned; consent given twice is one
     participant. The door where nobody can begin now.
 
-    link_fields: what the recruiter's link said (`recruiting.link_fields`). consent: the language
+    link_fields: what the recruiter's link said (`recruiting.link_fields`). token: of a
+    single-use link, which is spent. consent: the language
     of the text that was agreed to, and its sha256.
     """
     record = recruiting.record_of(session, lock=True)  # before looking: two clicks are one person
@@ -122,6 +123,9 @@ def enrol(
         return door
     if (door := recruiting.admission(session, study, link_fields)) is not Door.OPEN:
         return door
+    link = recruiting.invitation(session, record, token)
+    if isinstance(link, Door):
+        return link
     pilot = record.state in ("draft", "pilot")
     participant = Participant(visit=visit, resume_code=_secret(), pilot=pilot)
     participant.consent_language, participant.consent_sha256 = consent
@@ -130,6 +134,8 @@ def enrol(
         participant.recruit_id = link_fields.get(study.definition.recruiting.parameters[0])
     session.add(participant)
     session.flush()  # gives the number
+    if link:
+        link.participant_id = participant.id
     assign(session, study, record, participant)
     _note(session, participant, "consented")
     return participant
@@ -372,7 +378,7 @@ def withdraw(session: Session, participant: Participant) -> None:
 
 
 def _secret() -> str:
-    return "".join(secrets.choice(CODE_ALPHABET) for _ in range(CODE_LENGTH))
+    return "".join(secrets.choice(recruiting.ALPHABET) for _ in range(CODE_LENGTH))
 
 
 def find_by_key(session: Session, key: str) -> Participant | None:

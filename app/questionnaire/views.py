@@ -75,9 +75,15 @@ def welcome():
                 session.permanent = True
             if link_fields := recruiting.link_fields(study(), request.args):
                 session["recruit"] = link_fields
-            door = recruiting.door(db, recruiting.record_of(db), insider=password.logged_in())
+            if token := request.args.get("link"):
+                session["link"] = token[:20]
+            record = recruiting.record_of(db)
+            door = recruiting.door(db, record, insider=password.logged_in())
             if door is Door.OPEN:
                 door = recruiting.admission(db, study(), session.get("recruit", {}))
+            if door is Door.OPEN:
+                link = recruiting.invitation(db, record, session.get("link"))
+                door = link if isinstance(link, Door) else door
             if door is not Door.OPEN:
                 return _closed(door)
             return render_template(
@@ -124,6 +130,7 @@ def consent():
             session["visit"],
             insider=insider,
             link_fields=session.get("recruit", {}),
+            token=session.get("link"),
             consent=_consented(),
         )
         if isinstance(participant, Door):

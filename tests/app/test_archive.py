@@ -96,3 +96,28 @@ def test_what_is_there_is_not_written_over(app, written, study_dir, tmp_path, ca
     with pytest.raises(InputError, match="has .*study, .* already; expected an empty one"):
         archive.read(written, tmp_path / "new", url)
     assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.sqlite
+def test_an_archive_of_before_there_were_links_restores(app, study_dir, person, tmp_path):
+    import json
+    import zipfile
+
+    from app import archive
+
+    person().begin().answer(1)
+    archive.write(tmp_path / "new.zip", app.extensions["study"], app.extensions["database"])
+    with (
+        zipfile.ZipFile(tmp_path / "new.zip") as new,
+        zipfile.ZipFile(tmp_path / "old.zip", "w") as old,
+    ):
+        for name in new.namelist():
+            data = new.read(name)
+            if name == archive.ABOUT:
+                about = json.loads(data)
+                del about["tables"]["links"]
+                data = json.dumps(about).encode()
+            if name != "tables/links.jsonl":
+                old.writestr(name, data)
+    rows = archive.read(tmp_path / "old.zip", tmp_path / "again", None)
+    assert rows["responses"] == 1 and (tmp_path / "again/study.sqlite3").is_file()

@@ -15,6 +15,7 @@ FRAMINGS = ("close-up", "head-shot", "half-length")
 TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
 
 POSTS = [
+    "/dashboard/links",
     "/language",
     "/",
     "/familiarity",
@@ -70,6 +71,7 @@ OPEN = [
     "/study.css",
     "/health",
     "/metrics",
+    "/dashboard/links.csv",
     "/dashboard/login",
     "/simulation/",
     "/simulation/status.json",
