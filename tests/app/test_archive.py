@@ -100,11 +100,6 @@ def test_what_is_there_is_not_written_over(app, written, study_dir, tmp_path, ca
 
 @pytest.mark.sqlite
 def test_an_archive_of_before_there_were_links_restores(app, study_dir, person, tmp_path):
-    import json
-    import zipfile
-
-    from app import archive
-
     person().begin().answer(1)
     archive.write(tmp_path / "new.zip", app.extensions["study"], app.extensions["database"])
     with (
