@@ -139,3 +139,23 @@ def test_a_password_in_the_address_is_not_repeated(study_dir):
     with pytest.raises(InputError) as caught:
         create_app(study_dir, "postgresql+nodriver://me:tops3cret@localhost/x")
     assert "tops3cret" not in str(caught.value)
+
+
+def test_an_answer_is_one_look_one_row_and_one_commit(app, person):
+    """What a crowd costs: statements of an answer, and nothing written by looking at a page."""
+    from sqlalchemy import event
+
+    engine, statements, commits = app.extensions["database"]._engine, [], []
+    somebody = person().begin().answer(1)
+    event.listen(
+        engine, "before_cursor_execute", lambda c, cursor, text, *rest: statements.append(text)
+    )
+    event.listen(engine, "commit", lambda connection: commits.append(connection))
+    form = somebody.form("trial") | {"answer": "1", "rt_ms": "321"}
+    reply = somebody.http.post("/question", data=form, headers={"Accept": "application/json"})
+    assert reply.json["outcome"] == "recorded"
+    kinds = [text.split()[0] for text in statements if not text.startswith(("BEGIN", "SET"))]
+    assert kinds == ["SELECT", "INSERT"] and len(commits) == 1
+    statements.clear()
+    somebody.get("/question")
+    assert not any(text.startswith(("INSERT", "UPDATE", "DELETE")) for text in statements)
