@@ -313,9 +313,11 @@ def _excluded(
     `ENOUGH` asks for each gave.
     """
     decided = table.left + table.right
+    # Where everybody was given a part of the questions, the longest list is what there was to do.
+    given_at_most = np.minimum(questions, table.answers.max())
     checks = {
         "answered_share": rules.answered_share is not None
-        and table.answers < (rules.answered_share or 0) * questions,
+        and table.answers < (rules.answered_share or 0) * given_at_most,
         "one_side_share": rules.one_side_share is not None
         and (np.maximum(table.left, table.right) >= (rules.one_side_share or 0) * decided)
         & (table.side_p < ONE_SIDE_P),
@@ -346,7 +348,7 @@ def _silent(rules: Exclusions, given: Mapping[str, np.ndarray]) -> list[str]:
 def rules_in_words(options: Options) -> str:
     """The rules of exclusion, those that the study declared apart from defaults."""
     words = {
-        "answered_share": "answered under {:.0%} of the questions",
+        "answered_share": "answered under {:.0%} of the questions, or of the most that anybody did",
         "one_side_share": "at least {:.0%} on one side, and not by chance (p < 0.001)",
         "median_rt_ms": "median answer under {:g} ms",
         "same_answer_share": "the same answer at least {:.0%} of the time",

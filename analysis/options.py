@@ -19,7 +19,8 @@ class Exclusions:
     """Rules under which a participant is left out in the second pass of `agreement.sensitivity`,
     and nowhere else; None: no rule.
 
-    answered_share      leave out who answered less than this share of the study's questions, 0 to 1
+    answered_share      leave out who answered less than this share of the study's questions, 0 to
+                        1; where nobody was asked all, of the most that anybody answered
     one_side_share      ... who chose one side in at least this share of decided answers, 0 to 1,
                         where that is unlikely by chance (two-sided binomial p below 0.001)
     median_rt_ms        ... whose median answer took less than this, milliseconds

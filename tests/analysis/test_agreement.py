@@ -543,3 +543,13 @@ def test_two_techniques_have_no_tastes_no_circles_and_nothing_to_contradict():
     words = conclude(results.tables, results.notes, responses.codebook, FAST, 9, False)
     assert not any("tastes" in one for one in words.can)
     assert draw_triads(results.tables["participants"]) is None
+
+
+def test_lists_of_a_part_of_the_questions_exclude_nobody(lines):
+    """Where everybody is given a third of the pairs, nobody answers half of the questions: the
+    longest list is what there was to do, and who leaves it early is excluded as before.
+    """
+    pairs = [f"{a}{sign}{b}" for (a, b), sign in zip(combinations("abcdef", 2), "><=" * 5)]
+    people = [" ".join(pairs[(k + 3 * j) % 15] for j in range(5)) for k in range(9)]
+    result = participants(lines(*people, " ".join(pairs[:2])), FAST)
+    assert list(result.excluded) == [""] * 9 + ["answered_share"]
