@@ -198,6 +198,7 @@ class Frame:
                 r.lamps,
                 r.media[medium - 1] if r.media else None,
                 r.surroundings,
+                (*r.surfaces.surfaces, *r.surfaces.eyes),
             ),
             piece.first,
             self.height,

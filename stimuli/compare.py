@@ -29,7 +29,7 @@ BACKGROUND, INK = (24, 24, 26), (236, 236, 236)
 @dataclass(frozen=True)
 class Options:
     """size (width, height) of the images; crop (x, y, width, height) in them, None for all;
-    walks: of the reference, a computed pixel; pool_mm: see there, 0 for no bias; within_mm: of a
+    walks: of the reference, a computed pixel; pool_mm, light, index: see there; within_mm: of a
     shadow's edge; thin_mm: what is thin.
     """
 
@@ -38,6 +38,8 @@ class Options:
     crop: tuple[int, int, int, int] | None = None
     walks: int = 64
     pool_mm: float = 0.0
+    light: str = "given"
+    index: float = 0.0
     seed: int = 0
     within_mm: float = 3.0
     thin_mm: float = 8.0
@@ -152,8 +154,8 @@ def _shot(framing, frame, lights, techniques, options: Options, distances: Dista
     window = (slice(top, top + height), slice(left, left + width))
     wide = tuple(slice(part.start * s, part.stop * s) for part in window)
     frame.renderer.context.make_current()
-    chosen = {"walks": options.walks, "pool_mm": options.pool_mm, "seed": options.seed}
-    truth = make("reference", chosen)
+    own = {name: getattr(options, name) for name in ("walks", "pool_mm", "seed", "light", "index")}
+    truth = make("reference", own)
     inside = np.zeros((frame.height, frame.width), bool)
     inside[wide] = True
     halves, scatters, regions, residual = _truth(frame, truth, lights, inside, options)
@@ -220,7 +222,7 @@ def _truth(frame, truth, lights, inside: np.ndarray, options: Options):
         if not where.any():
             continue
         halves[:, where] = truth.halves(inputs, where).values
-        residual = np.maximum(residual, medium_of(inputs.room).residual)
+        residual = np.maximum(residual, medium_of(inputs.room, options.index).residual)
         solid = Solid([part_of(drawn) for drawn in inputs.room.surfaces])
         depths = inputs.depths.read()[..., 0]
         points, normals, seen = visible(solid, inputs.room.camera, depths, where)

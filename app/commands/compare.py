@@ -64,6 +64,20 @@ def _crop(_context, _parameter, value: str | None):
     help="Denoise the reference over so much, with a small bias; 0: no bias.",
 )
 @click.option(
+    "--light",
+    type=click.Choice(["given", "traced"]),
+    default="given",
+    show_default=True,
+    help="The reference's: what techniques are given, or traced from the lamps on.",
+)
+@click.option(
+    "--index",
+    type=click.FloatRange(0, 3),
+    default=0.0,
+    show_default=True,
+    help="Of refraction of the reference's face, 1.4 for skin; 0: the medium's own.",
+)
+@click.option(
     "--supersample",
     type=click.IntRange(1, 4),
     default=1,

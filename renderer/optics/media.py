@@ -236,7 +236,7 @@ def _joined(name: str, results: list) -> Curve:
 
 @dataclass(frozen=True)
 class Inversion:
-    """Coefficients of an index-matched, isotropic medium whose curve is nearest to a given one.
+    """Coefficients of an isotropic medium whose curve is nearest to a given one.
 
     residual (C,): rms at a straight edge that is left, since a formula need not be a medium's.
     """
@@ -245,12 +245,13 @@ class Inversion:
     residual: np.ndarray
 
 
-def invert(target: Curve, photons: int = 100_000) -> Inversion:
+def invert(target: Curve, photons: int = 100_000, eta: float = 1.0) -> Inversion:
     """Find a medium for a curve: alpha' from the albedo, then the mean free path from the shape.
 
     The reduced albedo is that which gives the curve's albedo under diffuse light (Chandrasekhar's
-    exact solution); the curve of a medium scales with its mean free path, so that one run a
-    channel is enough.
+    exact solution where the face is matched, Monte Carlo where `eta`, the index within over that
+    outside, is not 1); the curve of a medium scales with its mean free path, so that one run a
+    channel is then enough.
     """
     from scipy.optimize import brentq, minimize_scalar
 
@@ -261,12 +262,17 @@ def invert(target: Curve, photons: int = 100_000) -> Inversion:
     sigma_a, sigma_s, residual = [], [], []
     for c in range(target.channels):
         wanted = float(np.clip(target.albedo[c], 0.001, 0.98))
-        alpha = brentq(
-            lambda a, wanted=wanted: float(chandrasekhar.diffuse_albedo(np.array([a]))[0]) - wanted,
-            1e-4,
-            0.99999,
-        )
-        unit = simulated(Stack.of(Medium((1 - alpha,), (alpha,), eta=1.0)), photons)
+
+        def too_bright(a: float, wanted=wanted) -> float:
+            if eta == 1:
+                return float(chandrasekhar.diffuse_albedo(np.array([a]))[0]) - wanted
+            inside = Stack.of(Medium((1 - a,), (a,), eta=eta))
+            return float(simulated(inside, photons).albedo[0]) - wanted
+
+        # photons say the albedo to some thousandths: the root need not be finer
+        ends = (1e-4, 0.99999) if eta == 1 else (0.01, 0.9999)
+        alpha = brentq(too_bright, *ends, xtol=2e-12 if eta == 1 else 1e-4)
+        unit = simulated(Stack.of(Medium((1 - alpha,), (alpha,), eta=eta)), photons)
         x = target.positions(c)
         goal = target.edge(x)[:, c]
 
@@ -281,6 +287,6 @@ def invert(target: Curve, photons: int = 100_000) -> Inversion:
         sigma_s.append(alpha / mfp)
         residual.append(minimum.fun)
     medium = Medium(
-        tuple(sigma_a), tuple(sigma_s), eta=1.0, name=f"{target.name}_inverted", source="inversion"
+        tuple(sigma_a), tuple(sigma_s), eta=eta, name=f"{target.name}_inverted", source="inversion"
     )
     return Inversion(medium, np.array(residual))

@@ -83,7 +83,7 @@ def _intersector(mesh: trimesh.Trimesh):
     return trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
 
 
-def _seen(light: Light, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def seen(light: Light, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit directions (N, 3) to the lamp, distance (N,) mm, and the factor of its irradiance."""
     if isinstance(light, DistantLight):
         towards = np.broadcast_to(light.towards, points.shape)
@@ -166,7 +166,7 @@ class Tracer:
         rays: shadow rays a point, over the lamp's size; rng None: one, to its middle.
         """
         for light in self._lights:
-            towards, distance, strength = _seen(light, points)
+            towards, distance, strength = seen(light, points)
             strength = np.where(np.einsum("ni,ni->n", normals, towards) > 0, strength, 0)
             facing = np.flatnonzero(strength > 0)
             lit = self._unshadowed(light, points, normals, facing, rays, rng, towards, distance)

@@ -8,7 +8,7 @@ import os
 import time
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -40,22 +40,29 @@ class Walked:
     albedo: np.ndarray
 
 
-def walked(description: str | dict) -> Walked:
+def walked(description: str | dict, index: float = 0.0) -> Walked:
     """The medium of what a scene names: its own coefficients where it is one deep layer; else the
-    index-matched, isotropic medium whose curve is nearest (renderer.optics.media.invert).
+    isotropic medium whose curve is nearest (renderer.optics.media.invert).
+
+    index: of refraction within over that outside; 0: the medium's own, 1 for what is inverted.
     """
-    return _walked(json.dumps(description, sort_keys=True, default=list))
+    return _walked(json.dumps(description, sort_keys=True, default=list), index)
 
 
 @lru_cache(maxsize=32)
-def _walked(description: str) -> Walked:
+def _walked(description: str, index: float) -> Walked:
     stack, target = (read(json.loads(description)) for read in (media.read, media.curve))
     deep = isinstance(stack, Stack) and len(stack.layers) == 1 and np.isinf(stack.thickness_mm)
     if deep and stack.n_above == 1:
         medium, residual = stack.layers[0].medium, np.zeros(stack.channels)
+        if index and index != medium.eta:
+            medium = replace(medium, eta=index)
+            target = media.simulated(Stack.of(medium))
     else:
-        inversion = media.invert(target)
+        inversion = media.invert(target, eta=index or 1.0)
         medium, residual = inversion.medium, inversion.residual
+        if medium.eta != 1:
+            target = media.simulated(Stack.of(medium))
     if medium.eta == 1 and medium.g == 0:
         albedo = chandrasekhar.diffuse_albedo(medium.albedo)
     else:
@@ -136,7 +143,7 @@ def estimate(
         file = caches.folder() / "reference" / f"{key}-{walks}.npz"
     half, channels = walks // 2, medium.medium.channels
     sums = np.zeros((2, 2, len(points), channels))  # under the light and under 1, by half
-    done = _take_up(file, sums, half)
+    done = take_up(file, sums, half)
     # so many walks of a point at a time that small pictures fill a block too
     together = max(1, min(half, BLOCK // max(2 * len(points), 1)))
     started = saved = time.monotonic()
@@ -152,12 +159,12 @@ def estimate(
             noise = Halves(*sums / (done * medium.albedo), done).noise
             bar.set_postfix_str(f"standard error {' '.join(f'{v:.4f}' for v in noise)}")
             if time.monotonic() - saved > SAVE_EVERY_S:
-                _save(file, sums, done)
+                save(file, sums, done)
                 saved = time.monotonic()
     finally:
         bar.close()
         if time.monotonic() - started > SAVE_EVERY_S:
-            _save(file, sums, done)
+            save(file, sums, done)
     return Halves(*sums / (half * medium.albedo), half)
 
 
@@ -238,7 +245,7 @@ def _key(
     return digest.hexdigest()[:32]
 
 
-def _take_up(file: Path | None, sums: np.ndarray, half: int) -> int:
+def take_up(file: Path | None, sums: np.ndarray, half: int) -> int:
     """Put the furthest kept sums of this key that are not too far into `sums`: walks of a half."""
     best = 0
     for kept in file.parent.glob(f"{file.stem.split('-')[0]}-*.npz") if file else ():
@@ -252,7 +259,7 @@ def _take_up(file: Path | None, sums: np.ndarray, half: int) -> int:
     return best
 
 
-def _save(file: Path | None, sums: np.ndarray, done: int) -> None:
+def save(file: Path | None, sums: np.ndarray, done: int) -> None:
     """Write the sums whole or not at all."""
     if file is None:
         return

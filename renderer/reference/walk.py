@@ -75,22 +75,30 @@ class Solid:
 @dataclass(frozen=True)
 class Walks:
     """Where walks left a solid: source (K,), the index of the start; triangle (K,) and barycentric
-    weights (K, 3); carried (K,), the share of the light that is left.
+    weights (K, 3); carried (K,), the share of the light that is left; directions (K, 3), unit
+    vectors, refracted, in which it goes on outside.
     """
 
     source: np.ndarray
     triangle: np.ndarray
     weights: np.ndarray
     carried: np.ndarray
+    directions: np.ndarray
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _enter(normals, index, key, eta, state, directions):
-    """Random states and inward directions of walks, as diffuse light that has passed the face."""
-    for i in range(len(normals)):
+def _start(index, key, state):
+    """Random states of walks."""
+    for i in range(len(state)):
         # the number of the walk, well mixed: states of neighbours share no stretch of the sequence
-        _, bits = _bits(key + index[i] * np.uint64(0xD1342543DE82EF95))
-        s = bits
+        _, state[i] = _bits(key + index[i] * np.uint64(0xD1342543DE82EF95))
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _enter(normals, eta, state, directions):
+    """Inward directions of walks, as diffuse light that has passed the face."""
+    for i in range(len(normals)):
+        s = state[i]
         while True:
             s, bits = _bits(s)
             cosine = math.sqrt(1 - _uniform(bits))
@@ -146,6 +154,7 @@ def _event(
     out_triangle,
     out_weights,
     out_carried,
+    out_directions,
 ):
     """What happens at the end of every free path; (walks that go on, walks that left).
 
@@ -162,9 +171,9 @@ def _event(
             step = np.float64(far[i])
             x, y, z = at[i, 0] + dx * step, at[i, 1] + dy * step, at[i, 2] + dz * step
             if cosine > 0:
-                mirrored = 0.0
+                mirrored, beyond = 0.0, cosine
                 if eta != 1:
-                    mirrored, _ = fresnel(eta, 1.0, min(cosine, 1.0))
+                    mirrored, beyond = fresnel(eta, 1.0, min(cosine, 1.0))
                     s, bits = _bits(s)
                     if _uniform(bits) >= mirrored:
                         mirrored = 0.0
@@ -172,6 +181,10 @@ def _event(
                     out_source[left], out_triangle[left], out_carried[left] = source[i], k, w
                     out_weights[left, 0] = 1 - np.float64(u[i]) - np.float64(v[i])
                     out_weights[left, 1], out_weights[left, 2] = u[i], v[i]
+                    turn = beyond - eta * cosine
+                    out_directions[left, 0] = eta * dx + turn * nx
+                    out_directions[left, 1] = eta * dy + turn * ny
+                    out_directions[left, 2] = eta * dz + turn * nz
                     left += 1
                     continue
                 dx -= 2 * cosine * nx
@@ -226,10 +239,12 @@ def walk(
     normals: np.ndarray,
     index: np.ndarray,
     seed: Sequence[int],
+    inside: np.ndarray | None = None,
 ) -> Walks:
     """Walk from points (N, 3) mm on a solid, with outward normals (N, 3), until all have left.
 
-    Light enters as diffuse light from outside does, and leaves in any direction. index (N,): a
+    Light enters as diffuse light from outside does, or along unit directions `inside` (N, 3) below
+    the face, and leaves in any direction. index (N,): a
     number of each walk; with the seed it decides the path, whatever else is walked beside it. A
     face that is met from outside is gone through; where the surface has a hole there is medium
     beyond, as far as the solid's bounds, and what gets out of these is lost.
@@ -240,7 +255,11 @@ def walk(
     count = len(points)
     at = np.asarray(points, float) - solid.middle - INWARD_MM * normals
     directions, state = np.empty((count, 3)), np.empty(count, np.uint64)
-    _enter(np.asarray(normals, float), index.astype(np.uint64), key, eta, state, directions)
+    _start(index.astype(np.uint64), key, state)
+    if inside is None:
+        _enter(np.asarray(normals, float), eta, state, directions)
+    else:
+        directions[:] = inside
     weight, source = np.ones(count), np.arange(count)
     ended = []
     while count:
@@ -252,6 +271,7 @@ def walk(
             np.empty(count, np.int64),
             np.empty((count, 3)),
             np.empty(count),
+            np.empty((count, 3)),
         )
         walking = (at[:count], directions[:count], state[:count], weight[:count], source[:count])
         rules = (solid.normals, solid.bounds, albedo, g, eta)
@@ -259,5 +279,6 @@ def walk(
         if left:
             ended.append([array[:left] for array in out])
     if not ended:
-        return Walks(np.empty(0, int), np.empty(0, int), np.empty((0, 3)), np.empty(0))
+        none, places = np.empty(0, int), np.empty((0, 3))
+        return Walks(none, none, places, np.empty(0), places)
     return Walks(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))

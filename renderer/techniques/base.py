@@ -70,7 +70,8 @@ class Room:
     placed(drawn, domain, size, points, point_mm): a surface's light over "ATLAS" or "POINTS", see
     Renderer.placed. points(drawn, faces, weights): points on it. camera: the uniforms
     camera_position, view and projection; depth: the target whose depth buffer holds what is seen;
-    lamps: with the layers of their maps; surroundings: the environment.
+    lamps: with the layers of their maps; surroundings: the environment; bodies: all surfaces and
+    eyes of the scene.
     """
 
     surfaces: tuple[Drawn, ...]
@@ -82,6 +83,7 @@ class Room:
     lamps: Lamps
     value: str | dict | None
     surroundings: Surroundings
+    bodies: tuple[Drawn, ...]
 
 
 @dataclass(frozen=True)

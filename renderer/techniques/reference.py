@@ -22,6 +22,7 @@ from renderer.optics.curve import Curve
 from renderer.optics.medium import Stack
 from renderer.parameters import parameter
 from renderer.passes.surfaces import Drawn
+from renderer.reference import traced
 from renderer.reference.estimate import Halves, Walked, estimate, walked
 from renderer.reference.walk import Part, Solid
 from renderer.techniques.base import Inputs, Room, Scattered, Technique
@@ -35,12 +36,23 @@ class Reference(Technique):
     """Walks a pixel and channel, at the resolution at which scattering is computed: with 2 x 2
     samples an output pixel has four times as many. Light comes through thin parts by walking.
     With pool_mm above 0 the picture is a denoised one, with less noise and a small bias.
+
+    light "given": the irradiance that every technique is given, which isolates the transport;
+    "traced": rays and walks from the lamps and the surroundings on (renderer.reference.traced), so
+    many of them as there are walks, wherever they end. index: of refraction of the medium over that
+    outside; above 1 the face is a smooth dielectric; 0: the medium's own, 1 for what is inverted.
     """
 
     walks: int = parameter(
         64, unit="a computed pixel", low=2, high=4096, source="noise falls as 1 / sqrt(walks)"
     )
     seed: int = parameter(0, low=0, high=2**31 - 1, source="of the walks")
+    light: str = parameter(
+        "given", choices=("given", "traced"), source="given: transport alone is judged"
+    )
+    index: float = parameter(
+        0.0, unit="within over outside (0: the medium's)", low=0.0, high=3.0, source="1.4: skin"
+    )
     pool_mm: float = parameter(
         0.0,
         unit="mm (0: no bias)",
@@ -61,12 +73,18 @@ class Reference(Technique):
         super().__post_init__()
         if self.walks % 2:
             raise InputError(f"reference.walks is {self.walks}; expected an even number")
+        if 0 < self.index < 1:
+            raise InputError(f"reference.index is {self.index}; expected 0, or 1 or more")
+        if self.light == "traced" and self.pool_mm:
+            raise InputError(
+                f"reference.pool_mm is {self.pool_mm}; expected 0 where light is traced"
+            )
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         """That of the medium that is walked in for a preset's curve; for others the curve's own."""
         if curve.name not in media.names():
             return curve.edge(x_mm)
-        made = walked(curve.name)
+        made = walked(curve.name, self.index)
         if not made.residual.any():
             return curve.edge(x_mm)
         return media.simulated(Stack.of(made.medium)).edge(x_mm)
@@ -91,9 +109,11 @@ class Reference(Technique):
         """Scattered irradiance at the pixels `where` (H, W), row 0 at the top, in their order."""
         room = inputs.needed_room(self.name)
         solid = Solid([part_of(drawn) for drawn in room.surfaces])
-        medium = medium_of(room)
+        medium = medium_of(room, self.index)
         if medium.medium.channels != 3:
             raise InputError(f"the medium has {medium.medium.channels} channels; expected 3")
+        if self.light == "traced":
+            return self._traced(inputs, where, solid, medium)
         depths = inputs.depths.read()[..., 0]
         points, normals, seen = visible(solid, room.camera, depths, where)
         own = inputs.irradiance.read()[where][:, :3]
@@ -116,11 +136,36 @@ class Reference(Technique):
         values[:, seen], carried[:, seen] = halves.values, halves.carried
         return Halves(values, carried, halves.walks)
 
+    def _traced(self, inputs: Inputs, where: np.ndarray, solid: Solid, medium: Walked) -> Halves:
+        """By light that is traced from where it comes from."""
+        room = inputs.needed_room(self.name)
+        point_mm = float(np.ptp(solid.corners)) / 1000
+
+        def tint(triangles, weights, channel):
+            _, albedo = self._at(room, solid, triangles, weights, point_mm)
+            return albedo[:, channel]
+
+        parts = [part_of(drawn) for drawn in room.surfaces]
+        own = {id(drawn) for drawn in room.surfaces}
+        others = [part_of(drawn) for drawn in room.bodies if id(drawn) not in own]
+        scene = traced.World.of(parts, others, room.lamps.lights, room.surroundings.radiance, tint)
+        eye = traced.Eye.of(room.camera, where, inputs.pixels_per_mm, scene)
+        photons = self.walks // 2 * int(where.sum())
+        return traced.trace(scene, medium, eye, photons, self.seed)
+
     def _light(
         self, room: Room, solid: Solid, triangles: np.ndarray, weights: np.ndarray, point_mm: float
     ) -> np.ndarray:
-        """The irradiance (K, 3) that the scene gives at points of a solid's triangles."""
-        light = np.zeros((len(triangles), 3))
+        """The irradiance (K, 3) that the scene gives at points of a solid's triangles, as
+        texturing has it."""
+        light, own = self._at(room, solid, triangles, weights, point_mm)
+        return light * np.maximum(own, 1e-6) ** self.texturing if self.texturing else light
+
+    def _at(
+        self, room: Room, solid: Solid, triangles: np.ndarray, weights: np.ndarray, point_mm: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Irradiance (K, 3) where the medium is, else 0, and albedo (K, 3) there."""
+        light, own = np.zeros((len(triangles), 3)), np.zeros((len(triangles), 3))
         owner = np.searchsorted(solid.starts, triangles, side="right") - 1
         for k, drawn in enumerate(room.surfaces):
             mine = np.flatnonzero(owner == k)
@@ -134,18 +179,16 @@ class Reference(Technique):
                 e, _, albedo, *_ = placed.textures
                 given = _listed(e, len(mine))
                 light[mine] = given[:, :3] * (np.abs(given[:, 3:] - room.medium) < 0.5)
-                if self.texturing:
-                    own = np.maximum(_listed(albedo, len(mine))[:, :3], 1e-6)
-                    light[mine] *= own**self.texturing
+                own[mine] = _listed(albedo, len(mine))[:, :3]
             finally:
                 placed.delete()
                 points.delete()
-        return light
+        return light, own
 
 
-def medium_of(room: Room) -> Walked:
-    """The medium that is walked in for a room's."""
-    return walked(room.surfaces[0].item.primitive.material.value.layered())
+def medium_of(room: Room, index: float = 0.0) -> Walked:
+    """The medium that is walked in for a room's; index: see `walked`."""
+    return walked(room.surfaces[0].item.primitive.material.value.layered(), index)
 
 
 def visible(
