@@ -148,6 +148,11 @@ def rate(session: Session, participant: Participant, familiarity: int) -> None:
         _note(session, participant, "rated")
 
 
+def measure(participant: Participant, screen: str) -> None:
+    """Record what was measured of the screen (JSON, of `app.questionnaire.screen`)."""
+    participant.screen = screen
+
+
 def state(session: Session, participant: Participant, values: dict[str, str]) -> None:
     """Append answers to questions of the study's own, by their names; the first ones stay."""
     known = {one.name for one in participant.statements}
@@ -164,12 +169,12 @@ def upcoming(session: Session, participant: Participant, count: int) -> list[Row
     """The next trials (id, order, cell, left, right), at most `count`: the current one first, then
     those whose images are worth fetching beforehand. Empty when all are answered.
     """
-    asked = {
+    parameters = {
         "participant": participant.id,
         "first": participant.answered + 1,
         "last": participant.answered + count,
     }
-    return list(session.execute(_UPCOMING, asked))
+    return list(session.execute(_UPCOMING, parameters))
 
 
 _UPCOMING = (
@@ -257,27 +262,27 @@ def _answer(
     shown: Shown | None,
     bound: bool,
 ) -> tuple[Outcome, Standing] | None:
-    asked = connection.execute(_ASKED, {"trial": trial_id, "visit": visit}).one_or_none()
-    if asked is None:
+    due = connection.execute(_DUE, {"trial": trial_id, "visit": visit}).one_or_none()
+    if due is None:
         return None
     here = Standing(
-        asked.familiarity,
-        asked.withdrawn_at,
-        asked.answered,
-        asked.questions,
-        asked.stated,
-        asked.screen,
-        asked.study_state,
+        due.familiarity,
+        due.withdrawn_at,
+        due.answered,
+        due.questions,
+        due.stated,
+        due.screen,
+        due.study_state,
     )
-    if asked.order is None or asked.withdrawn_at or asked.study_state == "closed":
+    if due.order is None or due.withdrawn_at or due.study_state == "closed":
         return Outcome.STALE, here
-    if asked.answer is not None:
-        if asked.answer == given.value and asked.point in (None, given.point):
+    if due.answer is not None:
+        if due.answer == given.value and due.point in (None, given.point):
             return Outcome.REPEATED, here
-        kept = asked.answer if asked.point is None else asked.point
+        kept = due.answer if due.point is None else due.point
         refused = given.value if given.point is None else given.point
         event = {
-            "participant_id": asked.id,
+            "participant_id": due.id,
             "trial_id": trial_id,
             "kind": "refused",
             "detail": f"kept {kept}, refused {refused}",
@@ -287,19 +292,19 @@ def _answer(
             connection.execute(insert(Event.__table__), event | {"at": now()})
         return Outcome.REFUSED, here
     images = (
-        study.image(asked.cell, asked.left).sha256,
-        study.image(asked.cell, asked.right).sha256,
+        study.image(due.cell, due.left).sha256,
+        study.image(due.cell, due.right).sha256,
     )
     if (
-        asked.order != asked.answered + 1
-        or asked.familiarity is None
+        due.order != due.answered + 1
+        or due.familiarity is None
         or images != (given.image_left_sha256, given.image_right_sha256)
     ):
         return Outcome.STALE, here
     answered_at = now()
     if shown is None or shown.trial_id != trial_id or shown.at > answered_at:
         began = answered_at - timedelta(milliseconds=given.rt_ms or 0)
-        shown = Shown(trial_id, max(began, asked.consented_at), 1)
+        shown = Shown(trial_id, max(began, due.consented_at), 1)
     by_server = round((answered_at - shown.at).total_seconds() * 1000)
     rt_ms, reported = given.rt_ms, None
     if rt_ms is None:
@@ -307,7 +312,7 @@ def _answer(
     elif bound and rt_ms > by_server + CLOCKS_APART_MS:  # longer than the question has been there
         rt_ms, reported = by_server, rt_ms
     row = {
-        "participant_id": asked.id,
+        "participant_id": due.id,
         "trial_id": trial_id,
         "answer": given.value,
         "rt_ms": rt_ms,
@@ -322,7 +327,7 @@ def _answer(
     return Outcome.RECORDED, replace(here, answered=here.answered + 1)
 
 
-_ASKED = (
+_DUE = (
     select(
         Participant.id,
         Participant.familiarity,
@@ -387,8 +392,8 @@ def find_by_key(session: Session, key: str) -> Participant | None:
     """
     plain = plain_code(key)
     old = Participant.withdrawal_key.is_(None) & (Participant.completion_code == plain)
-    asked = select(Participant).where((Participant.withdrawal_key == plain) | old)
-    return session.scalar(asked) if plain else None
+    query = select(Participant).where((Participant.withdrawal_key == plain) | old)
+    return session.scalar(query) if plain else None
 
 
 def find_by_resume_code(session: Session, code: str) -> Participant | None:

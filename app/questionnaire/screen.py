@@ -24,15 +24,15 @@ MEASURED = {
 
 def read(form: dict[str, str]) -> dict[str, float]:
     """The measures of a form that are numbers within their limits; the others are left out."""
-    found = {}
+    measures = {}
     for name, (low, high) in MEASURED.items():
         try:
             value = float(form.get(name, ""))
         except ValueError:
             continue
         if low <= value <= high:
-            found[name] = round(value, 4)
-    return found
+            measures[name] = round(value, 4)
+    return measures
 
 
 def large_enough(measures: dict[str, float], least_px: tuple[int, int]) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import secrets
+from collections.abc import Callable
 
 from flask import (
     Blueprint,
@@ -147,8 +148,8 @@ def _consented() -> tuple[str, str]:
 
 
 def _closed(door: Door):
-    asked = study().definition.recruiting
-    back = asked.back(asked.turned_away, session.get("recruit", {}))
+    recruiter = study().definition.recruiting
+    back = recruiter.back(recruiter.turned_away, session.get("recruit", {}))
     return render_template("questionnaire/door.html", message=gettext(door.value), back=back), 403
 
 
@@ -186,12 +187,7 @@ def rate():
     if value not in levels:
         flash(gettext("Please choose one of the levels."))
         return redirect(url_for(".familiarity"), 303)
-    with database().write() as db:
-        participant = _participant(db, lock=True)
-        if participant:
-            flow.rate(db, participant, value)
-        place = _place(participant)
-    return redirect(url_for(place), 303)
+    return _record("familiarity", lambda db, participant: flow.rate(db, participant, value))
 
 
 @blueprint.get("/before")
@@ -226,12 +222,9 @@ def keep_screen():
         return render_template(
             "questionnaire/screen.html", small=True, measured=screen.MEASURED, upcoming=[]
         )
-    with database().write() as db:
-        participant = _participant(db, lock=True)
-        if participant and _place(participant) == "questionnaire.look_at_screen":
-            participant.screen = json.dumps(measures)
-        place = _place(participant)
-    return redirect(url_for(place), 303)
+    return _record(
+        "look_at_screen", lambda _, participant: flow.measure(participant, json.dumps(measures))
+    )
 
 
 @blueprint.get("/after")
@@ -265,10 +258,15 @@ def _state(page: str, asks: tuple[Ask, ...]):
         flash(gettext("Please answer the questions that are not marked as optional."))
         session["given"] = {ask.name: request.form.get(ask.name, "")[:200] for ask in asks}
         return redirect(url_for(f".{page}"), 303)
+    return _record(page, lambda db, participant: flow.state(db, participant, values))
+
+
+def _record(page: str, change: Callable[[Session, Participant], None]):
+    """Commit what a page gave, if that page is due, and go to the one that is due then."""
     with database().write() as db:
         participant = _participant(db, lock=True)
         if participant and _place(participant) == f"questionnaire.{page}":
-            flow.state(db, participant, values)
+            change(db, participant)
             participant = _participant(db)
         place = _place(participant)
     return redirect(url_for(place), 303)
@@ -283,12 +281,14 @@ def question():
         trial, *following = flow.upcoming(db, participant, 1 + PRELOADED_QUESTIONS)
     if request.args.get("rested") == str(participant.answered):
         session["rested"] = participant.answered
-    asked = study().in_language(language.current())
+    definition = study().in_language(language.current())
     if session.get("rested") != participant.answered and _pauses(participant.answered):
         return render_template(
             "questionnaire/pause.html",
             participant=participant,
-            paragraphs=asked.pages.instructions.split("\n\n") if not participant.answered else [],
+            paragraphs=definition.pages.instructions.split("\n\n")
+            if not participant.answered
+            else [],
             upcoming=_of([trial, *following]),
         )
     shown = flow.Shown.again(flow.Shown.of_cookie(session.get("shown")), trial)
@@ -302,7 +302,7 @@ def question():
         reference=study().manifest.reference(trial.cell),
         upcoming=_of(following),
         measured=["view", *_MEASURED],
-        reason=asked.reason if _asks_reason(participant, trial.order) else None,
+        reason=definition.reason if _asks_reason(participant, trial.order) else None,
     )
 
 
@@ -475,19 +475,19 @@ def _place(here: Participant | Standing | None) -> str:
         return "questionnaire.welcome"
     if here.withdrawn_at:
         return "questionnaire.withdrawn"
-    asked = study().definition
+    definition = study().definition
     unfinished = here.answered < here.questions
     if unfinished and here.study_state == "closed":
         return "questionnaire.closed"
     if here.familiarity is None:
         return "questionnaire.familiarity"
-    if here.stated < len(asked.before):
+    if here.stated < len(definition.before):
         return "questionnaire.before"
-    if asked.screen.check and here.screen is None:
+    if definition.screen.check and here.screen is None:
         return "questionnaire.look_at_screen"
     if unfinished:
         return "questionnaire.question"
-    own = len(asked.before) + len(asked.after)
+    own = len(definition.before) + len(definition.after)
     return "questionnaire.after" if here.stated < own else "questionnaire.thanks"
 
 

@@ -88,8 +88,8 @@ export class Viewer {
     const fitted = this.options.display === FIT ? place(this.mode, FIT, room, box).scale : 1;
     this.scales = scales(this.options, fitted);
     this.step = Math.min(this.step, this.scales.length - 1);
-    const found = place(this.mode, this.scales[this.step], room, box, this.scales[0]);
-    return { ...found, fits: this.scales[this.step] === FIT, room };
+    const placed = place(this.mode, this.scales[this.step], room, box, this.scales[0]);
+    return { ...placed, fits: this.scales[this.step] === FIT, room };
   }
 
   // Put frames, captions and buttons where they belong.
@@ -146,9 +146,9 @@ export class Viewer {
       context.drawImage(bitmap, -at.x, -at.y, size.width, size.height);
       context.restore();
     };
-    const label = (k, text, spoken) => {
+    const label = (k, text, name) => {
       this.figures[k].querySelector("figcaption").replaceChildren(...text.map((part) => Object.assign(document.createElement("span"), { textContent: part })));
-      this.canvases[k].setAttribute("aria-label", `${this.words.image} ${spoken}`);
+      this.canvases[k].setAttribute("aria-label", `${this.words.image} ${name}`);
     };
     if (!IN_PLACE.includes(mode)) return this.canvases.forEach((canvas, k) => {
       paint(canvas, this.bitmaps[this.swapped ? REFERENCE : k]);

@@ -20,23 +20,23 @@ async function begin() {
   words = JSON.parse(page.dataset.words);
   scale.disabled = true;
   viewer = null;
-  tell(page, notice);
+  showNotice(page, notice);
   notice = null;
   if (page.dataset.resume) store(RESUME, page.dataset.resume);
 
   const unsent = recall();
   if (unsent && unsent.participant === page.dataset.participant) {
-    say(page, words.sending);
+    showStatus(page, words.sending);
     return advance(page, await deliver(page, form, unsent.fields));
   }
   forget();
 
-  const told = setTimeout(() => say(page, words.loading), FIRST_PAUSE_MS);
-  pictures.onTrouble = () => page.isConnected && say(page, words.trouble);
+  const soon = setTimeout(() => showStatus(page, words.loading), FIRST_PAUSE_MS);
+  pictures.onTrouble = () => page.isConnected && showStatus(page, words.trouble);
   const shown = new Viewer(page, words);
   await shown.show();
-  clearTimeout(told);
-  say(page, "");
+  clearTimeout(soon);
+  showStatus(page, "");
   viewer = shown;
   scale.disabled = false;
   pictures.ahead(JSON.parse(page.dataset.upcoming), viewer.options, roomOf(viewer.pair));
@@ -63,15 +63,15 @@ async function deliver(page, form, fields, again = true) {
   const response = await insist(page, words.unsaved, form.action, {
     method: "POST", body, headers: { Accept: "application/json" },
   });
-  const told = await response.json().catch(() => ({}));
+  const reply = await response.json().catch(() => ({}));
   if (response.ok || response.status === 409) {
     forget();
-    notice = words[told.outcome] ?? null; // of an answer that was not taken
-    return told.next;
+    notice = words[reply.outcome] ?? null; // of an answer that was not taken
+    return reply.next;
   }
-  if (told.lost && again && (await letIn(page, form))) return deliver(page, form, fields, false);
-  if (!told.lost) forget();
-  say(page, told.error || words.rejected);
+  if (reply.lost && again && (await letIn(page, form))) return deliver(page, form, fields, false);
+  if (!reply.lost) forget();
+  showStatus(page, reply.error || words.rejected);
   return null;
 }
 
@@ -110,11 +110,11 @@ async function insist(page, message, url, options) {
     try {
       const response = await fetch(url, { ...options, cache: "no-store", signal: AbortSignal.timeout(PATIENCE_MS) });
       if (response.status < 500 && response.status !== 429) {
-        say(page, "");
+        showStatus(page, "");
         return response;
       }
     } catch { /* no connection, or too slow: the same answer sent twice is one answer */ }
-    say(page, message);
+    showStatus(page, message);
     await rest(pause);
   }
 }
@@ -150,13 +150,13 @@ function offerKeys(page) {
   box.addEventListener("change", () => store(KEYS_OFF, box.checked ? null : "1"));
 }
 
-function tell(page, message) {
+function showNotice(page, message) {
   const place = page.querySelector(".notice");
   place.textContent = message ?? "";
   place.hidden = !message;
 }
 
-function say(page, message) {
+function showStatus(page, message) {
   const status = page.querySelector(".status");
   if (status.textContent !== message) status.textContent = message;
 }

@@ -13,9 +13,9 @@ const measures = () => ({
 });
 
 function look() {
-  const found = measures();
-  for (const [name, value] of Object.entries(found)) field(name).value = value;
-  const pixels = [found.window_width, found.window_height].map((side) => Math.round(side * found.device_pixel_ratio));
+  const measured = measures();
+  for (const [name, value] of Object.entries(measured)) field(name).value = value;
+  const pixels = [measured.window_width, measured.window_height].map((side) => Math.round(side * measured.device_pixel_ratio));
   form.querySelector("[data-window]").textContent = `(${pixels.join(" × ")})`;
   const card = form.querySelector(".bank-card"), stripes = form.querySelector("[data-grey]"), steps = form.querySelector("[data-steps]");
   if (card) {
