@@ -9,6 +9,7 @@ VERBS = {
     "render": "app.commands.render",
     "techniques": "app.commands.techniques",
     "compare": "app.commands.compare",
+    "experiment": "app.commands.experiment",
     "build": "app.commands.build",
     "study": "app.commands.study",
     "strip": "app.commands.strip",

@@ -31,6 +31,8 @@ FORMS = (
     ("golubev_plus", {}),
     ("golubev_plus", {"sets": "nested"}),
     ("golubev_adaptive", {}),
+    ("subdermal", {}),
+    ("subdermal", {"kernel": "curve"}),
 )
 PLACES = ((480.0, 0.0), (240.0, 0.0), (480.0, 30.0), (480.0, 60.0))  # mm, degrees
 PIXELS_PER_MM = 9000.0  # at 1 mm

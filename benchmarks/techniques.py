@@ -28,10 +28,14 @@ SURFACE = ("atlas", "points")  # walks are the truth, and as slow as it is
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--framing", action="append", choices=list(renderer.FRAMINGS))
+    parser.add_argument("--technique", action="append", choices=list(renderer.TECHNIQUES))
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="of filters of the screen")
     given = parser.parse_args()
     sparse = {"points": {"spacing_mm": SPACING_MM}}
-    kinds = {n: kind for n, kind in renderer.TECHNIQUES.items() if kind.domain != "walks"}
+    wanted = {*(given.technique or renderer.TECHNIQUES), "golubev"}
+    kinds = {
+        n: kind for n, kind in renderer.TECHNIQUES.items() if kind.domain != "walks" and n in wanted
+    }
     techniques = {name: renderer.make(name, sparse.get(kinds[name].domain)) for name in kinds}
     screen = {name: made for name, made in techniques.items() if made.domain == "screen"}
     surface = {name: made for name, made in techniques.items() if made.domain in SURFACE}

@@ -272,15 +272,21 @@ class Frame:
         return Result(image, samples, contrast)
 
     def develop(
-        self, scattered: gl.Texture, technique: Technique, piece: Piece | None = None
+        self,
+        scattered: gl.Texture,
+        technique: Technique,
+        piece: Piece | None = None,
+        rounded: bool = True,
     ) -> np.ndarray:
-        """The image (H, W, 3) uint8 sRGB of light that a technique has scattered, or a piece."""
+        """The image (H, W, 3) sRGB of light that a technique has scattered, or a piece: uint8, or
+        float32 in [0, 1] before it is rounded.
+        """
         r, bare, dimmed = self.renderer, None, None
         if technique.specular_white is not None:
             bare = self._bare_specular() if r.hair else None
             specular = bare.textures[1] if bare else self.surface.textures[1]
             dimmed = (specular, technique.specular_white * self._strongest())
-        image = composite(
+        pixels = composite(
             r.context,
             r.program,
             scattered,
@@ -296,7 +302,7 @@ class Frame:
         )
         if bare:
             bare.delete()
-        return image
+        return np.rint(pixels * 255).astype(np.uint8) if rounded else pixels
 
     def _bare_specular(self) -> gl.Target:
         """Surfaces once more: textures[1] is specular light without hair. The caller frees it."""

@@ -21,6 +21,10 @@ def caches() -> dict[str, tuple[Path, str]]:
             folder() / "reference",
             "walks of long reference renders; walked again",
         ),
+        "converged": (
+            folder() / "converged",
+            "pictures that experiments compare to; drawn again",
+        ),
     }
 
 
@@ -41,7 +45,7 @@ def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
 @click.option(
     "--clear",
     metavar="NAME",
-    type=click.Choice(["heads", "montecarlo", "reference"]),
+    type=click.Choice(["heads", "montecarlo", "reference", "converged"]),
     help="Remove this cache by its name. Nothing in it is lost for good.",
 )
 def command(clear: str | None) -> None:

@@ -78,7 +78,12 @@ class Texture:
         GL.glTexParameteri(self.kind, GL.GL_TEXTURE_WRAP_S, wrap)
         GL.glTexParameteri(self.kind, GL.GL_TEXTURE_WRAP_T, wrap)
         if mipmap:
-            GL.glGenerateMipmap(self.kind)
+            self.reduce()
+
+    def reduce(self) -> None:
+        """Make the levels of means anew from the texels."""
+        GL.glBindTexture(self.kind, self.id)
+        GL.glGenerateMipmap(self.kind)
 
     def _bytes(self, mipmap: bool) -> int:
         texels = self.width * self.height
@@ -143,7 +148,8 @@ def _upload(data: np.ndarray | None) -> tuple[int, np.ndarray | None]:
 class Target:
     """A framebuffer: one texture per internal format, and a depth buffer of its own or another's.
 
-    depth: True for a buffer of its own, another Target to share that one's, False for none.
+    depth: True for a buffer of its own, another Target to share that one's, False for none. mipmap:
+    the textures have levels of means, made by their `reduce`.
     """
 
     def __init__(
@@ -153,9 +159,12 @@ class Target:
         formats: list[int],
         depth: bool | Target = False,
         linear: bool = False,
+        mipmap: bool = False,
     ):
         self.width, self.height = width, height
-        self.textures = [Texture(width, height, internal, linear) for internal in formats]
+        self.textures = [
+            Texture(width, height, internal, linear, mipmap=mipmap) for internal in formats
+        ]
         self._framebuffer()
         self._depth, self._depth_handle = None, None
         for k, texture in enumerate(self.textures):

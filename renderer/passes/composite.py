@@ -28,8 +28,8 @@ def composite(
     piece: Piece | None = None,
     dimmed: tuple[gl.Texture, float] | None = None,
 ) -> np.ndarray:
-    """The image (H, W, 3) uint8 sRGB of scattered irradiance over a frame's buffers, or the rows of
-    it that are right in a piece.
+    """The image (H, W, 3) float32 sRGB in [0, 1] of scattered irradiance over a frame's buffers, or
+    the rows of it that are right in a piece.
 
     texturing: the power of the albedo that scattered light has already been multiplied by;
     conserving: the face holds back what it reflects inside; dimmed: specular light without hair and
@@ -75,5 +75,4 @@ def composite(
                 first_row=piece.low // supersample,
             )
             gl.draw_fullscreen(context)
-            pixels = final.textures[0].read()[..., :3]
-    return np.rint(pixels * 255).astype(np.uint8)
+            return final.textures[0].read()[..., :3]

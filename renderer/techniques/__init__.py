@@ -19,6 +19,7 @@ from renderer.techniques.none import NoScattering
 from renderer.techniques.reference import Reference
 from renderer.techniques.splat_dipole import SplatDipole
 from renderer.techniques.splat_multipole import SplatMultipole
+from renderer.techniques.subdermal import Subdermal
 
 TECHNIQUES: dict[str, type[Technique]] = {
     "none": NoScattering,
@@ -32,6 +33,7 @@ TECHNIQUES: dict[str, type[Technique]] = {
     "deon_luebke": DeonLuebke,
     "splat_dipole": SplatDipole,
     "splat_multipole": SplatMultipole,
+    "subdermal": Subdermal,
     "reference": Reference,
 }
 

@@ -23,13 +23,9 @@ FILTER_CDF = 0.997  # the share of the energy within the filter's radius
 
 
 @dataclass(frozen=True)
-class BurleyDisc(RotatedTechnique):
-    """What the techniques share that take samples of Burley's profile over a disc.
-
-    Distances are fitted to the medium's curve unless given. weights "surface": R(r') over R(r), the
-    estimator on the surface itself, whatever its tilt; "published": times r' / r, as in the
-    published code, which takes far samples of a tilted surface for too many. disc "camera": it
-    faces the camera; "tangent": it lies in the surface's tangent plane, from differences of depth.
+class BurleyFilter(RotatedTechnique):
+    """What the filters share whose kernel is Burley's profile: its distances, fitted to the
+    medium's curve unless given.
     """
 
     distance_mm: tuple[float, float, float] | None = parameter(
@@ -47,13 +43,6 @@ class BurleyDisc(RotatedTechnique):
         high=20.0,
         source="HDRP world scale",
     )
-    weights: str = parameter(
-        "surface", choices=("surface", "published"), source="HDRP 2018 multiplies by r' / r"
-    )
-    disc: str = parameter(
-        "camera", choices=("camera", "tangent"), source="thesis, sec. 3.4 and fig. 3.11: camera"
-    )
-
     texturing: float = parameter(
         0.5,
         unit="of the albedo's exponent before scattering",
@@ -71,15 +60,33 @@ class BurleyDisc(RotatedTechnique):
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         return fits.BurleyFit(self.distances(curve), np.zeros(3)).edge(x_mm)
 
+    def filter_radius_mm(self, curve: Curve) -> float:
+        """Radius that holds FILTER_CDF of the widest channel's energy."""
+        return float(burley.inverse_cdf(FILTER_CDF, self.distances(curve).max()))
+
+
+@dataclass(frozen=True)
+class BurleyDisc(BurleyFilter):
+    """What the techniques share that take samples of Burley's profile over a disc.
+
+    weights "surface": R(r') over R(r), the estimator on the surface itself, whatever its tilt;
+    "published": times r' / r, as in the published code, which takes far samples of a tilted surface
+    for too many. disc "camera": it faces the camera; "tangent": it lies in the surface's tangent
+    plane, from differences of depth.
+    """
+
+    weights: str = parameter(
+        "surface", choices=("surface", "published"), source="HDRP 2018 multiplies by r' / r"
+    )
+    disc: str = parameter(
+        "camera", choices=("camera", "tangent"), source="thesis, sec. 3.4 and fig. 3.11: camera"
+    )
+
     def farthest_mm(self, curve: Curve, samples: int) -> float:
         """The radius of the farthest of so many samples; on a tilted disc a little more is seen."""
         widest = float(self.distances(curve).max())
         margin = 1.05 if self.disc == "tangent" else 1.0
         return margin * float(burley.inverse_cdf(1 - 0.5 / samples, widest))
-
-    def filter_radius_mm(self, curve: Curve) -> float:
-        """Radius that holds FILTER_CDF of the widest channel's energy."""
-        return float(burley.inverse_cdf(FILTER_CDF, self.distances(curve).max()))
 
     def defines(self) -> dict[str, Any]:
         return {

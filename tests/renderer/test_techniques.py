@@ -106,6 +106,8 @@ BOUNDS = {
     # sample of either set is as near as Golubev's first, so that blue's edge is wider
     "golubev_plus": (0.010, 0.20, 0.36),
     "golubev_adaptive": (0.006, 0.16, 0.16),
+    # three taps where light is even: two rings cannot follow red's far end
+    "subdermal": (0.011, 0.16, 0.16),
 }
 
 

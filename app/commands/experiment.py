@@ -1,0 +1,153 @@
+"""subdermal experiment: the documents' claims as experiments that anyone can run again."""
+
+from pathlib import Path
+
+import click
+
+from app.commands.media import writable
+from app.commands.render import SIZE, patch_of, size_of
+
+
+@click.group("experiment", no_args_is_help=False)
+def command() -> None:
+    """Put a claim on trial: samples."""
+
+
+@command.command("samples")
+@click.argument("scene", default="thesis")
+@click.option(
+    "--techniques",
+    "-t",
+    multiple=True,
+    default=["golubev", "golubev_plus", "golubev_adaptive", "subdermal"],
+    show_default=True,
+    metavar="NAME[:KEY=VALUE...]",
+    help="A technique with its parameters, golubev:samples=12; the first is what the others are "
+    "set against; repeat for more.",
+)
+@click.option(
+    "--framing",
+    "-f",
+    "framings",
+    multiple=True,
+    default=["close-up", "head-shot", "half-length"],
+    show_default=True,
+    help="A framing of the scene, repeat for more.",
+)
+@click.option(
+    "--converged",
+    metavar="NAME[:KEY=VALUE...]",
+    help="What pictures are compared to; golubev with 256 samples in 4 frames if not given.",
+)
+@click.option(
+    "--size",
+    "-s",
+    default="1920x1080",
+    show_default=True,
+    metavar=SIZE,
+    callback=size_of,
+    help="Size of the image in pixels.",
+)
+@click.option(
+    "--supersample",
+    type=click.IntRange(1, 4),
+    default=2,
+    show_default=True,
+    help="Computed pixels in a pixel along each side.",
+)
+@click.option(
+    "--edges",
+    "edges_mm",
+    type=click.FloatRange(0.01, 1000),
+    default=2.6,
+    show_default=True,
+    metavar="MM",
+    help="How far from a cast shadow's edge still counts as beside it.",
+)
+@click.option(
+    "--jumps",
+    "jumps_mm",
+    type=click.FloatRange(0.01, 1000),
+    default=1.0,
+    show_default=True,
+    metavar="MM",
+    help="How far from a jump of depth of 2 mm still counts as beside it.",
+)
+@click.option(
+    "--rotations",
+    type=click.IntRange(0, 1024),
+    default=0,
+    show_default=True,
+    help="Also the bias of techniques with rotations, from the mean of so many frames; 0: not.",
+)
+@click.option(
+    "--set",
+    "patches",
+    multiple=True,
+    metavar="KEY=VALUE",
+    callback=patch_of,
+    help="A value over the scene's, by its dotted key: lights.rim=false; repeat for more.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Seed of hair, skin noise and baked light.",
+)
+@click.option(
+    "--keep/--no-keep",
+    default=True,
+    show_default=True,
+    help="Keep the converged pictures, which take minutes, in the cache.",
+)
+@click.option(
+    "--table",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The CSV file for the table, which is printed in any case.",
+)
+def samples(scene, techniques, framings, converged, patches, table, **options) -> None:
+    """Say how many samples techniques take in SCENE and how far their pictures are from converged
+    ones, over skin: a row as soon as it is measured.
+
+    Under supersampling an output pixel has several computed pixels: 22 samples at 2x2 are 88.
+    Differences are root mean squares of sRGB levels (of 255) before they are rounded; each is
+    followed by its ratio to the first technique's.
+    """
+    from analysis.objective import MAPS
+    from stimuli.experiment import CONVERGED, Options, chosen, write_table
+    from stimuli.experiment import samples as measured
+
+    if table:
+        writable(table, (".csv",))
+    if converged == "all":
+        raise click.BadParameter("got all; expected one technique", param_hint="--converged")
+    (goal,) = chosen([converged or CONVERGED]).values()
+    options = Options(**options)
+    rows: list = []
+    shown = ("rmse", "edges", "jumps", *MAPS)
+    click.echo(f"against {converged or CONVERGED}; levels of 255, ratios to {techniques[0]}")
+    click.echo(
+        f"{'framing':<12} {'technique':<32} {'samples':>8} {'output px':>9} {'saved':>6}"
+        + "".join(f"{name:>16}" for name in shown)
+        + (f"{'bias':>8}" if options.rotations else "")
+    )
+    for row in measured(scene, patches, framings, chosen(techniques), goal, options, MAPS):
+        rows.append(row)
+        first = next(one for one in rows if one.framing == row.framing)
+        own, other = row.cells(), first.cells()
+        saved = 1 - row.samples / first.samples if first.samples else 0.0
+        parts = "".join(f"{own[k]:>9.3g} ({_ratio(own[k], other[k])})" for k in shown)
+        bias = f"{row.bias:>8.3f}" if options.rotations else ""
+        click.echo(
+            f"{row.framing:<12} {row.technique:<32} {row.samples:>8.2f} {row.output_samples:>9.1f} "
+            f"{100 * saved:>5.1f}%{parts}{bias}"
+        )
+        if table:  # after each row: an interrupted run keeps what it has measured
+            write_table(rows, options, table)
+    if table:
+        click.echo(f"{table}: {len(rows)} rows")
+
+
+def _ratio(value: float, other: float) -> str:
+    return f"{value / other:.2f}" if other else " -  "

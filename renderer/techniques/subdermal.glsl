@@ -1,0 +1,76 @@
+// A tile's number of taps: the pixel itself and rings about it, each tap the mean over its part of the disc where the guard lets it be one.
+#include "shaders/common.glsl"
+#include "shaders/screen.glsl"
+uniform sampler2D irradiance; uniform sampler2D depths;
+uniform sampler2D guarded;     // with its levels of means
+uniform sampler2D chosen;      // a texel a tile
+uniform sampler2D taps;        // two rows a rung: radius, angle, side of the mean, least radius of depth, mm; weights over the profile
+uniform float firsts[SETS];    // where each set begins
+uniform float on_ring[SETS];   // taps on each ring of it
+uniform vec3 shape;            // 1 / d per channel, 1/mm
+uniform float pixels_per_mm;
+uniform float filter_radius_mm;
+uniform float levels;          // of the pyramid
+uniform float whole;           // the least share of a mean that the guard has to let in
+uniform float jitter;          // 1: a rotation a block at random, 0: the same for all pixels
+uniform float turn;            // of this frame, in turns
+uniform int block;             // pixels that share a rotation, along one side
+layout(location = 0) out vec4 scattered;
+layout(location = 1) out vec4 count;
+
+// A mean over a texel spreads what it stands for by half its squared side: box and tent, along both axes (renderer/optics/rings.py).
+const float TEXEL_VARIANCE = 0.5;
+const float LOST = 1.0;        // pixels of each row of a mean that may be missing; a step of depth takes two
+const float STEEPEST = 8.0;    // slope of depth; what is steeper is a silhouette
+
+vec3 profile(float r) { vec3 third = exp(-shape * r / 3.0); return shape * (third * third * third + third) / r; }
+
+// Which even part of the turn between two taps a pixel of a block takes.
+float part_of_block(ivec2 pixel) {
+    ivec2 within = pixel % block;
+    int all = block * block;
+    return float(7 * (within.y * block + within.x) % all) / float(all);
+}
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy), last = textureSize(irradiance, 0) - 1;
+    vec4 own = texelFetch(irradiance, at, 0);
+    bool skin = own.a >= 0.5;
+    scattered = vec4(own.rgb, skin ? 1.0 : 0.0);
+    count = vec4(skin ? 1.0 : 0.0, 0.0, 0.0, 1.0);
+    float depth = texelFetch(depths, at, 0).x, scale = pixels_per_mm / max(depth, 1e-3), pixel_mm = 1.0 / scale;
+    vec2 slope = vec2(dFdx(depth), dFdy(depth)) * scale;
+    if (!skin || filter_radius_mm * scale < 1.0) return;
+    float foreshortened = max(abs(slope.x), abs(slope.y)) < STEEPEST ? inversesqrt(1.0 + dot(slope, slope)) : 1.0;
+    vec4 tile = texelFetch(chosen, at / TILE, 0);
+    int set = int(tile.x), first = int(firsts[set]), row = 2 * clamp(int(tile.z), 0, textureSize(taps, 0).y / 2 - 1);
+    ivec2 pixel = ivec2(image_pixel());
+    float noise = interleaved_gradient_noise(vec2(pixel / block) + 0.5);
+    float start = 2.0 * PI * (jitter * (noise + part_of_block(pixel) / on_ring[set]) + turn);
+    vec2 size = vec2(textureSize(guarded, 0));
+    vec3 weight = texelFetch(taps, ivec2(first, row + 1), 0).rgb * profile(texelFetch(taps, ivec2(first, row), 0).w);
+    vec3 light = weight * own.rgb;  // the first tap is the pixel itself
+    for (int k = first + 1; k < first + int(tile.y); ++k) {
+        vec4 tap = texelFetch(taps, ivec2(k, row), 0);
+        float phi = tap.y + start, texel_mm = pixel_mm * clamp(tap.z * foreshortened * scale, 1.0, exp2(levels));
+        vec2 towards = scale * vec2(cos(phi), sin(phi));
+        // what another side than the fitted one spreads more or less by comes off the radius or on it
+        float squared = tap.x * tap.x + TEXEL_VARIANCE * (tap.z * tap.z - texel_mm * texel_mm);
+        vec2 there = gl_FragCoord.xy + sqrt(max(squared, 0.04 * tap.x * tap.x)) * towards;
+        vec4 mean = textureLod(guarded, there / size, log2(texel_mm * scale));
+        bool averaged = mean.a >= max(whole, 1.0 - LOST / (texel_mm * scale));
+        if (!averaged) {
+            float single = tap.x * tap.x + TEXEL_VARIANCE * max(tap.z * tap.z - pixel_mm * pixel_mm, 0.0);
+            there = gl_FragCoord.xy + sqrt(single) * towards;
+        }
+        ivec2 middle = clamp(ivec2(floor(there)), ivec2(0), last);
+        vec4 fine = texelFetch(irradiance, middle, 0);
+        if (fine.a < 0.5) continue;
+        float step = texelFetch(depths, middle, 0).x - depth;
+        vec3 w = texelFetch(taps, ivec2(k, row + 1), 0).rgb * profile(sqrt(tap.w * tap.w + step * step));
+        weight += w;
+        light += w * (averaged ? mean.rgb / mean.a : fine.rgb);
+    }
+    count.x = tile.y;
+    scattered.rgb = mix(own.rgb, light / max(weight, 1e-12), greaterThan(weight, vec3(1e-8)));
+}

@@ -1,0 +1,211 @@
+"""Our own: a pixel and a few fitted rings, means where the surface is whole, counts by tile.
+
+It stands on four things that are known, put together. Taps are means over the part of the disc that
+they stand for, read from a pyramid (Krivanek and Colbert 2008, "Real-time shading with filtered
+importance sampling", doi:10.1111/j.1467-8659.2008.01252.x), but only where a guard says that no
+step of depth and nothing that is not skin is in them. Their radii and weights are fitted to the
+profile (renderer/optics/rings.py), a pixel's own light being the first. The pixels of a block share
+a rotation and turn by even parts of it, so that a ring is met at even angles and what is linear in
+its light cancels. How many taps a pixel takes is decided for tiles of 8 x 8 pixels, from their
+means, before any tap is taken: no tap both decides and estimates. docs/subdermal.md has what each
+part is worth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from renderer import gl
+from renderer.gl import GL
+from renderer.optics import burley, fits, rings
+from renderer.optics.curve import Curve
+from renderer.parameters import parameter
+from renderer.techniques.base import Inputs
+from renderer.techniques.golubev import BurleyFilter
+from renderer.techniques.rotated import GOLDEN
+from renderer.techniques.screen import Canvas
+
+#: Rings, and taps on each of them, of the sets that a tile chooses among: 1 + rings x taps in all.
+SETS = ((2, 1), (3, 1), (4, 1), (5, 1), (6, 1), (4, 2), (5, 2), (5, 3), (5, 4), (6, 5))
+COUNTS = tuple(1 + rings * taps for rings, taps in SETS)
+TILE = 8  # pixels
+LEVELS = 6  # of the pyramid: means over 64 x 64 pixels
+PAD = 1 << LEVELS  # so that every mean is one of whole pixels
+RUNG = 1.3  # between the sizes of a pixel for which sets are fitted
+#: Taps of a ring are means over texels whose side falls with their number to this power.
+NARROWER = 0.5
+LEAST = 1e-30  # of a profile: what lies farther out has no weight that floats can hold
+
+
+@dataclass(frozen=True)
+class Subdermal(BurleyFilter):
+    """n = fewest + by_spread s + by_unguarded sqrt(u) min(1, s / full_spread) taps, of SETS'.
+
+    s: relative spread of the irradiance of the widest channel about the tile; u: the share of skin
+    there that the guard keeps from being averaged. kernel "burley": rings are fitted to Burley's
+    profile; "curve": to the medium's own curve, which few profiles of one parameter can be.
+    """
+
+    fewest: float = parameter(3.0, unit="taps", low=3.0, high=31.0, source="docs/subdermal.md")
+    by_spread: float = parameter(
+        10.0, unit="taps, of a relative spread of 1", low=0.0, high=1e3, source="docs/subdermal.md"
+    )
+    by_unguarded: float = parameter(
+        50.0, unit="taps, where all is unguarded", low=0.0, high=1e3, source="docs/subdermal.md"
+    )
+    full_spread: float = parameter(
+        0.1, unit="relative spread", low=1e-6, high=10.0, source="docs/subdermal.md"
+    )
+    neighbourhood: float = parameter(
+        2.2,
+        unit="of the widest distance: sigma of the spread",
+        low=0.0,
+        high=20.0,
+        source="1 mm of the six-Gaussian skin, docs/subdermal.md",
+    )
+    kernel: str = parameter(
+        "burley", choices=("burley", "curve"), source="Golubev 2018; the medium's own"
+    )
+    texel: float = parameter(
+        1.3, unit="of a tap's radius", low=0.0, high=4.0, source="docs/subdermal.md"
+    )
+    noise: float = parameter(
+        0.005, unit="see renderer.optics.rings.fit", low=0.0, high=1.0, source="docs/subdermal.md"
+    )
+    guard_px: float = parameter(
+        3.0, unit="pixel widths that are a step of depth", low=0.0, high=1e6, source="Subdermal"
+    )
+    whole: float = parameter(
+        0.85,
+        unit="of a mean's pixels that the guard has to let in; large means ask for more",
+        low=0.01,
+        high=1.0,
+        source="docs/subdermal.md",
+    )
+    pyramid: bool = parameter(True, source="taps are means; false: single pixels")
+    blocks: bool = parameter(True, source="the pixels of an output pixel share a rotation")
+
+    name: ClassVar[str] = "subdermal"
+    title: ClassVar[str] = "Subdermal"
+    paper: ClassVar[str] = "ours, docs/subdermal.md"
+
+    def sets(self, curve: Curve, rung: int) -> list[rings.Rings]:
+        """The fitted rings of every set, for pixels RUNG^rung mm wide."""
+        return [self._rings(curve, count, taps, rung) for count, taps in SETS]
+
+    def _texel(self, taps: int) -> float:
+        return self.texel / taps**NARROWER if self.pyramid else 0.0
+
+    def _rings(self, curve: Curve, count: int, taps: int, rung: int) -> rings.Rings:
+        own = curve if self.kernel == "curve" else None
+        distances = tuple(self.distances(curve))
+        return _fitted(own, distances, self.scale, count, self._texel(taps), rung, self.noise)
+
+    def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
+        if self.kernel == "curve":
+            return curve.edge(np.asarray(x_mm) / self.scale)
+        return super().edge(curve, x_mm)
+
+    def taps(self, curve: Curve, rung: int) -> np.ndarray:
+        """The taps of all sets (2, sum of COUNTS, 4): radius, angle, side of the mean and the least
+        radius by which depth is judged, mm; then each channel's weight over Burley's profile there.
+        """
+        d, pixel = self.distances(curve), RUNG**rung
+        rows: list[tuple[tuple[float, ...], tuple[float, ...]]] = []
+        for (_, taps), fitted in zip(SETS, self.sets(curve, rung), strict=True):
+            for k, (r, weights) in enumerate(zip(fitted.radius_mm, fitted.weights, strict=True)):
+                near = max(r, pixel)
+                profile = (np.exp(-near / d) + np.exp(-near / d / 3)) / (d * near)
+                number = taps if k else 1
+                share = weights / number / np.maximum(profile, LEAST)
+                side = max(self._texel(taps) * r, pixel) if k else 0.0
+                for j in range(number):
+                    turn = 2 * np.pi * (k * GOLDEN + j / number)
+                    rows.append(((r, turn, side, near), (*share, 0.0)))
+        return np.array(rows).transpose(1, 0, 2)
+
+    def passes(self, canvas: Canvas) -> None:
+        inputs, d = canvas.inputs, self.distances(canvas.inputs.curve)
+        size = [-(-side // PAD) * PAD for side in (inputs.width, inputs.height)]
+        tiled = [side // TILE for side in size]
+        defines = {"TILE": TILE, "SETS": len(SETS)}
+        floats = [GL.GL_RGBA32F]
+        with (
+            gl.Target(*size, floats, linear=True, mipmap=True) as guarded,
+            gl.Target(*tiled, floats * 2) as tiles,
+            gl.Target(*tiled, floats) as chosen,
+        ):
+            canvas.draw(guarded, "techniques/subdermal_guard.glsl", step_px=self.guard_px)
+            guarded.textures[0].reduce()
+            canvas.given["guarded"] = guarded.textures[0]
+            wide = np.eye(len(d))[int(np.argmax(d))]
+            canvas.draw(tiles, "techniques/subdermal_tiles.glsl", defines, widest=wide)
+            first, table = self._table(inputs, tiles.textures[1].read()[..., 0])
+            try:
+                canvas.draw(
+                    chosen,
+                    "techniques/subdermal_count.glsl",
+                    defines,
+                    tiles=tiles.textures[0],
+                    tile_depths=tiles.textures[1],
+                    sigma_mm=self.neighbourhood * float(d.max()),
+                    by=(self.fewest, self.by_spread, self.by_unguarded),
+                    full_spread=self.full_spread,
+                    counts=np.array(COUNTS, float),
+                    ladder=(first, np.log(RUNG)),
+                )
+                canvas.draw(
+                    canvas.result,
+                    "techniques/subdermal.glsl",
+                    defines,
+                    chosen=chosen.textures[0],
+                    taps=table,
+                    firsts=np.cumsum((0, *COUNTS))[:-1].astype(float),
+                    on_ring=np.array([taps for _, taps in SETS], float),
+                    shape=1 / d,
+                    filter_radius_mm=self.filter_radius_mm(inputs.curve),
+                    levels=float(LEVELS if self.pyramid else 0),
+                    whole=self.whole,
+                    block=inputs.supersample if self.blocks else 1,
+                )
+            finally:
+                table.delete()
+
+    def _table(self, inputs: Inputs, depths: np.ndarray) -> tuple[int, gl.Texture]:
+        """The first rung of the sizes of pixels in a picture, and the taps of all of them."""
+        widest = self.filter_radius_mm(inputs.curve)  # coarser pixels are left as they are
+        sizes = np.minimum(depths[depths > 0] / inputs.pixels_per_mm, widest)
+        ends = (sizes.min(), sizes.max()) if len(sizes) else (1.0, 1.0)
+        low, high = (int(np.floor(np.log(end) / np.log(RUNG) + 0.5)) for end in ends)
+        rows = [self.taps(inputs.curve, rung) for rung in range(low, high + 1)]
+        data = np.concatenate(rows)
+        return low, gl.Texture(data.shape[1], len(data), GL.GL_RGBA32F, data=data)
+
+    def self_check(self, curve: Curve) -> None:
+        widest = float(burley.inverse_cdf(0.9999, float(self.distances(curve).max())))
+        for fitted in self.sets(curve, int(np.log(self.distances(curve).min()) / np.log(RUNG))):
+            assert np.allclose(fitted.weights.sum(axis=0), 1, atol=1e-9)
+            assert (fitted.weights >= 0).all() and np.isfinite(fitted.radius_mm).all()
+            assert fitted.radius_mm[0] == 0 and (np.diff(fitted.radius_mm) > 0).all()
+            assert fitted.radius_mm[-1] < 2 * widest
+
+
+@lru_cache(maxsize=512)
+def _fitted(
+    curve: Curve | None,
+    distances: tuple[float, ...],
+    scale: float,
+    count: int,
+    texel: float,
+    rung: int,
+    noise: float,
+) -> rings.Rings:
+    """Rings fitted to a curve, or to Burley's profile of these distances."""
+    d = np.array(distances)
+    burleys = fits.BurleyFit(d, np.zeros(len(d)))
+    edge = burleys.edge if curve is None else lambda x: curve.edge(x / scale)
+    return rings.fit(edge, d, count, texel, RUNG**rung, noise)
