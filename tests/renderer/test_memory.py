@@ -45,7 +45,11 @@ def test_light_from_anywhere_and_small_images_make_one_piece(reach):
 
 def test_pieces_give_the_bytes_of_the_whole(frames, techniques, monkeypatch):
     frame = frames["close-up"]
-    wholes = {t: frame.render(one) for t, one in techniques.items() if one.domain == "screen"}
+    in_whole = {
+        "subdermal"
+    }  # the only filter of the screen whose means a piece's edge would change
+    screen = {t: one for t, one in techniques.items() if one.domain == "screen"}
+    wholes = {t: frame.render(one) for t, one in screen.items() if t not in in_whole}
     monkeypatch.setattr(cutting, "PIECE_PIXELS", 640 * 200)
     cut = {name: len(frame.pieces(technique)) for name, technique in techniques.items()}
     assert {name for name, count in cut.items() if count > 1} == wholes.keys()
