@@ -184,9 +184,9 @@ def participants(responses: Responses, options: Options) -> pd.DataFrame:
     }
     traps = responses.checks[responses.checks.kind == "trap"]
     obvious = np.sign(traps.answer.astype(float)) == np.sign(traps.expected.astype(float))
-    found = obvious.groupby(traps.participant.astype(str))
-    table["traps"] = found.size().reindex(table.index, fill_value=0).astype(int)
-    table["trap_share"] = found.mean().reindex(table.index).astype(float)
+    right_traps = obvious.groupby(traps.participant.astype(str))
+    table["traps"] = right_traps.size().reindex(table.index, fill_value=0).astype(int)
+    table["trap_share"] = right_traps.mean().reindex(table.index).astype(float)
     given["trap_share"] = table.traps.to_numpy()
 
     preference = np.concatenate(
@@ -505,8 +505,8 @@ def _consistency(
         comb(len(panel.items), 3) * int(here.sum()) for panel, here in zip(parts, full, strict=True)
     )
     if decided == triples and len(sizes) == 1 and max(sizes) <= MOST_EXACT_ITEMS:
-        asked = sum(int(here.sum()) for here in full)
-        p = few_triads(int(seen), asked, max(sizes))
+        complete = sum(int(here.sum()) for here in full)
+        p = few_triads(int(seen), complete, max(sizes))
     elif decided:
         p = float(stats.norm.cdf((seen - decided / 4) / np.sqrt(3 * decided / 16)))
     return [

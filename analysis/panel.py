@@ -123,7 +123,7 @@ def _panels(responses: Responses) -> dict[str, Panel]:
     )
     techniques = responses.codebook.techniques
 
-    def asked(name: str, here: np.ndarray) -> Panel:
+    def panel_of(name: str, here: np.ndarray) -> Panel:
         return _panel(
             name,
             techniques,
@@ -136,7 +136,7 @@ def _panels(responses: Responses) -> dict[str, Panel]:
 
     parts = {
         name: [
-            asked(name, (level == place) & (image == one))
+            panel_of(name, (level == place) & (image == one))
             for one in np.unique(image[level == place])
         ]
         for place, name in enumerate(responses.codebook.framings)
@@ -148,7 +148,7 @@ def _panels(responses: Responses) -> dict[str, Panel]:
     if len(result) > 1:
         every = [part for here in parts.values() for part in here]
         if factor != FRAMING and "framing" not in questions(frame, responses.codebook):
-            every = [asked(OVERALL, image == one) for one in np.unique(image)]
+            every = [panel_of(OVERALL, image == one) for one in np.unique(image)]
         result[OVERALL] = _joined(OVERALL, techniques, every)
     return result
 

@@ -593,17 +593,18 @@ def _check_notes(checks: pd.DataFrame) -> Iterable[str]:
         here = checks[checks.kind == kind]
         if here.empty:
             continue
-        said = ""
+        detail = ""
         if kind == "trap":
             right = int((np.sign(here.answer) == np.sign(here.expected)).sum())
-            said = f": {right} of them are the obvious one"
+            detail = f": {right} of them are the obvious one"
         elif kind == "bias":
             left, none = int((here.answer < 0).sum()), int((here.answer == 0).sum())
-            said = (
+            detail = (
                 f" (one image on both sides): {none} see no difference, {left} prefer the left, "
                 f"{len(here) - none - left} the right"
             )
-        yield f"{_plural(len(here), 'answer')} to {kind} pairs stand apart and count nowhere{said}."
+        count = _plural(len(here), "answer")
+        yield f"{count} to {kind} pairs stand apart and count nowhere{detail}."
 
 
 def _without_level(

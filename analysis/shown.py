@@ -504,8 +504,8 @@ def sensitivity(table: pd.DataFrame, codebook: Codebook) -> Shown:
                 "first": "highest worth",
             }.get(row.conclusion, row.conclusion),
             _pair(row, codebook),
-            _said(row.everyone, codebook),
-            _said(row.without_excluded, codebook),
+            _verdict_of(row.everyone, codebook),
+            _verdict_of(row.without_excluded, codebook),
         )
         for row in table.itertuples()
         if row.changed
@@ -610,7 +610,7 @@ def _pair(row: object, codebook: Codebook) -> str:
     return ", ".join(names) or NOTHING
 
 
-def _said(value: object, codebook: Codebook) -> str:
+def _verdict_of(value: object, codebook: Codebook) -> str:
     if isinstance(value, str):
         return codebook.label(value) if value in codebook.techniques else value
     return (

@@ -108,7 +108,9 @@ def main() -> int:
             TECHNIQUES, PAIR, framings=FRAMINGS, options=options, studies=1000, most=people
         )
         run = Studies(fresh, "full", difference, np.random.default_rng(given.seed))
-        decisions = (run.found if goal == "find" else run.excluded)(people)  # (studies, framings)
+        decisions = (run.detected if goal == "find" else run.excluded)(
+            people
+        )  # (studies, framings)
         begun, reached, agreed = time.process_time(), [], True
         with tempfile.TemporaryDirectory(prefix="subdermal-") as folder:
             path = Path(folder) / "responses.csv"

@@ -151,7 +151,7 @@ class Plan:
         return self.answers_each or max(1, (len(self.pairs) + 1) // 2)
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def reported(self) -> tuple[str, ...]:
         """The framings that results are told for: all as one, where their worths are the same."""
         return self.framings if set(self.framings) & set(self.worths) else (ANY,)
 

@@ -72,7 +72,7 @@ def plan_table(
                 for correction in CORRECTIONS:
                     true = _Rates(plan, studies[goal], goal, test, correction)
                     alarms = _Rates(plan, false, goal, test, correction)
-                    for place, framing in enumerate(plan.told):
+                    for place, framing in enumerate(plan.reported):
                         head = (framing, design, each, goal, test, correction)
                         powers = [true.at(people, place) for people in grid]
                         for people, power in zip(grid, powers, strict=True):
@@ -99,15 +99,15 @@ class _Rates:
         self.plan, self.correction = plan, correction
         self.decide = studies.contrasted
         if test == "declared":
-            self.decide = studies.found if goal == "find" else studies.excluded
+            self.decide = studies.detected if goal == "find" else studies.excluded
         self.known: dict[int, np.ndarray] = {}
 
     def at(self, people: int, place: int) -> float:
-        """The share with so many people, at the framing in this place of `plan.told`."""
+        """The share with so many people, at the framing in this place of `plan.reported`."""
         if people not in self.known:
             self.known[people] = self.decide(people, self.correction).mean(axis=0)
         rates = self.known[people]
-        return float(rates.mean() if self.plan.told == (ANY,) else rates[place])
+        return float(rates.mean() if self.plan.reported == (ANY,) else rates[place])
 
 
 def people_grid(most: int) -> list[int]:

@@ -72,7 +72,7 @@ class Studies:
             self._counts[people] = more + self._counts[before] if before else more
         return self._counts[people]
 
-    def found(self, people: int, correction: str = "family") -> np.ndarray:
+    def detected(self, people: int, correction: str = "family") -> np.ndarray:
         """(studies, framings) bool: whether the declared test finds a difference of the pair."""
         p = declared_p(self.counts(people), self.plan.options)
         return decided(self._adjusted(p, correction), self.plan.alpha)

@@ -191,7 +191,7 @@ def _assumptions(plan: Plan, codebook: Codebook, source: str) -> list[str]:
         f"- Worths in JOD, {source}; the pair set {plan.difference:g} apart about its middle, or 0 "
         "apart to exclude:"
     ]
-    for framing in plan.told:
+    for framing in plan.reported:
         values = zip(plan.techniques, plan.truth(framing, plan.difference), strict=True)
         worths = ", ".join(f"{codebook.label(name)} {worth:z.2f}" for name, worth in values)
         where = "every framing" if framing == ANY else codebook.framing_label(framing)

@@ -211,7 +211,7 @@ def test_power_decides_as_analyse_does(design, test, family):
             difference,
         )
         for people in (12, 60):
-            result, excluded = run.found(people), run.excluded(people)
+            result, excluded = run.detected(people), run.excluded(people)
             for study in range(0, 50, 10 if people > 20 else 5):
                 rows = pairs(table_of(run, study, people), options)
                 about = rows[(rows.a == "a") & (rows.b == "b") & (rows.framing != "overall")]
@@ -233,7 +233,7 @@ def test_the_whole_report_concludes_as_power_does(difference, goal):
         plan(techniques=("a", "b", "c"), pair=("a", "b"), most=50, studies=50, options=options),
         difference=difference,
     )
-    expected = (run.found(50) if goal == "find" else run.excluded(50))[:, 0]
+    expected = (run.detected(50) if goal == "find" else run.excluded(50))[:, 0]
     both_kinds = [*np.flatnonzero(expected)[:2], *np.flatnonzero(~expected)[:1]]
     for study in both_kinds:
         responses = table_of(run, study, 50)
@@ -269,7 +269,7 @@ def test_the_margin_is_the_declared_one():
 
 def test_the_first_step_asks_most_and_the_pair_alone_least():
     run, _ = run_of(plan(studies=200, most=60, framings=("x", "y", "z")))
-    rates = [run.found(60, one).mean() for one in ("first", "family", "none")]
+    rates = [run.detected(60, one).mean() for one in ("first", "family", "none")]
     assert rates == sorted(rates) and rates[0] < rates[2]
 
 
