@@ -101,7 +101,8 @@ def test_the_page_shows_the_region_of_each_cell(folder, tmp_path):
             image["region"] = [0.25, 0.5, 0.75, 1]
     (copy / "manifest.json").write_text(json.dumps(manifest))
     app = create_app(copy)
-    root, *rules = app.test_client().get("/study.css").text.splitlines()
+    root, gap, *rules = app.test_client().get("/study.css").text.splitlines()
+    assert gap.startswith(".pair { --gap: ")
     assert root == ":root { --surround: rgb(108 108 108); --on-surround: #fff; }"
     study = app.extensions["study"]
     boxes = [study.image(cell, study.techniques[0]).box for cell in study.cells]

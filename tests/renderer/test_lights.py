@@ -66,10 +66,14 @@ def drawn(scene_table, techniques, size=(128, 96)):
         return buffers
 
 
+#: Contrast decides (golubev_plus), or the light's spread about a tile (subdermal), or the lamp
+#: towards which it is thinnest (deon_luebke's maps).
+NOT_LINEAR = ("golubev_plus", "subdermal", "deon_luebke")
+
+
 def test_light_adds_in_irradiance_and_through_every_linear_technique():
-    """Five lamps are the sum of single ones, but where contrast decides (golubev_plus) or the lamp
-    towards which it is thinnest (deon_luebke's maps)."""
-    linear = [n for n in renderer.TECHNIQUES if n not in ("golubev_plus", "deon_luebke")]
+    """Five lamps are the sum of single ones."""
+    linear = [n for n in renderer.TECHNIQUES if n not in NOT_LINEAR]
     together = drawn(table(FIVE), linear)
     single = [drawn(table({name: light}), linear) for name, light in FIVE.items()]
     scatters = together["irradiance"][..., 3] > 0
