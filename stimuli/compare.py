@@ -165,8 +165,8 @@ def _shot(framing, frame, lights, techniques, options: Options, distances: Dista
     albedo = np.maximum(frame.surface.textures[2].read()[..., :3], 1e-6)
     strongest = np.max([light.irradiance for light in lights], axis=0) if lights else 0
     unit = np.where(strongest > 0, strongest, own[scatters].mean(axis=0))
-    means = np.stack([_pooled(half, s)[window] for half in halves])
-    masks = {name: _pooled(mask * 1.0, s)[window] == 1 for name, mask in regions.items()}
+    means = np.stack([pooled(half, s)[window] for half in halves])
+    masks = {name: pooled(mask * 1.0, s)[window] == 1 for name, mask in regions.items()}
     masks = {name: mask for name, mask in masks.items() if mask.sum() >= FEWEST}
     images = {"reference": _developed(frame, halves.mean(axis=0), truth)[window]}
     half = _developed(frame, halves[0], truth)[window]
@@ -175,7 +175,7 @@ def _shot(framing, frame, lights, techniques, options: Options, distances: Dista
         with frame.scatter(technique) as target:
             light = target.textures[0].read()[..., :3] / albedo**technique.texturing
             images[name] = frame.develop(target.textures[0], technique)[window]
-        light = _pooled(light, s)[window]
+        light = pooled(light, s)[window]
         maps = {
             key: tuple(distance(_unit(other), _unit(images[name])) for other in truths)
             for key, distance in distances.items()
@@ -238,7 +238,7 @@ def _truth(frame, truth, lights, inside: np.ndarray, options: Options):
     return halves, regions["skin"], regions, residual
 
 
-def _pooled(values: np.ndarray, s: int) -> np.ndarray:
+def pooled(values: np.ndarray, s: int) -> np.ndarray:
     """Means over s x s computed pixels: of output pixels."""
     height, width = values.shape[:2]
     return values.reshape(height // s, s, width // s, s, *values.shape[2:]).mean(axis=(1, 3))

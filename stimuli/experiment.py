@@ -11,7 +11,7 @@ import hashlib
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ import numpy as np
 from analysis.files import replacing
 from stimuli import sources
 from stimuli.compare import chosen as chosen
+from stimuli.compare import pooled
 from stimuli.errors import InputError
 from stimuli.scenes import load_table, merge, read_scene, stage
 
@@ -110,8 +111,6 @@ def _row(framing, label, frame, technique, goal, regions, options, distances) ->
     skin = regions["skin"]
     bias = float("nan")
     if options.rotations and hasattr(technique, "frames"):
-        from dataclasses import replace
-
         mean, _ = _drawn(frame, replace(technique, frames=options.rotations))
         noise = _rms(image - mean, skin) ** 2 / max(options.rotations - 1, 1)
         bias = float(np.sqrt(max(_rms(mean - goal, skin) ** 2 - noise, 0.0)))
@@ -195,11 +194,12 @@ def _regions(frame, lights, options: Options) -> dict[str, np.ndarray]:
         pixels_per_mm,
         options.edges_mm,
     )
-    skin = _pooled(where, options) == 1
-    skin &= _pooled(glossy[..., 3], options) < HAIR
+    s = options.supersample
+    skin = pooled(where * 1.0, s) == 1
+    skin &= pooled(glossy[..., 3], s) < HAIR
     jumps = _near_jumps(depths, pixels_per_mm, options.jumps_mm)
     near = {"edges": edges, "jumps": jumps}
-    return {"skin": skin} | {k: skin & (_pooled(v, options) > 0) for k, v in near.items()}
+    return {"skin": skin} | {k: skin & (pooled(v * 1.0, s) > 0) for k, v in near.items()}
 
 
 def _near_jumps(depths: np.ndarray, pixels_per_mm: float, within_mm: float) -> np.ndarray:
@@ -216,12 +216,6 @@ def _near_jumps(depths: np.ndarray, pixels_per_mm: float, within_mm: float) -> n
     if not jumps.any():
         return jumps
     return distance_transform_edt(~jumps) * depths / pixels_per_mm <= within_mm
-
-
-def _pooled(values: np.ndarray, options: Options) -> np.ndarray:
-    """Means over the computed pixels of output pixels."""
-    s, (height, width) = options.supersample, values.shape[:2]
-    return values.reshape(height // s, s, width // s, s).mean(axis=(1, 3), dtype=float)
 
 
 def write_table(rows: Sequence[Row], options: Options, file: Path) -> None:
