@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -124,17 +124,28 @@ def compare(
     distances: Distances,
 ) -> list[Shot]:
     """Every technique at every framing ("": the scene's own camera), beside the reference."""
+    table = merge(load_table(scene), patch)
+    return [
+        _shot(name, frame, lights, techniques, options, distances)
+        for name, frame, lights in framed(scene, table, framings, options)
+    ]
+
+
+def framed(
+    scene: str | Path, table: dict, framings: Sequence[str], options
+) -> Iterator[tuple[str, Any, list]]:
+    """Each framing ("": the scene's own camera) of a scene's table, its frame while it is open, and
+    the scene's lamps. options: its size, supersample and seed; InputError where nothing scatters.
+    """
     import renderer
     from renderer.scene import graph as graphs
 
-    table = merge(load_table(scene), patch)
     scenes = {}
     for framing in framings:
         level = {"camera": {"framing": framing}} if framing else {}
         scenes[framing or "own camera"] = read_scene(merge(table, level))
     staged = stage(next(iter(scenes.values())), options.seed)
     lights = graphs.contents(staged.graph).lights
-    shots = []
     with renderer.Renderer(
         staged.graph, size=options.size, supersample=options.supersample, seed=options.seed
     ) as drawing:
@@ -142,8 +153,7 @@ def compare(
             raise InputError(f"{scene}: nothing scatters in it; expected a material with a medium")
         for name, definition in scenes.items():
             with drawing.frame(definition.camera, definition.picture) as frame:
-                shots.append(_shot(name, frame, lights, techniques, options, distances))
-    return shots
+                yield name, frame, lights
 
 
 def _shot(framing, frame, lights, techniques, options: Options, distances: Distances) -> Shot:

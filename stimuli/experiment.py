@@ -20,9 +20,8 @@ import numpy as np
 from analysis.files import replacing
 from stimuli import sources
 from stimuli.compare import chosen as chosen
-from stimuli.compare import pooled
-from stimuli.errors import InputError
-from stimuli.scenes import load_table, merge, read_scene, stage
+from stimuli.compare import framed, pooled
+from stimuli.scenes import load_table, merge
 
 #: Maps (H, W) of the difference of two images (H, W, 3) in [0, 1], sRGB, the converged first.
 Distances = Mapping[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]
@@ -85,25 +84,12 @@ def samples(
     distances: Distances,
 ) -> Iterator[Row]:
     """A row for every technique at every framing, as soon as it is measured."""
-    import renderer
-    from renderer.scene import graph as graphs
-
     table = merge(load_table(scene), patch)
-    scenes = {name: read_scene(merge(table, {"camera": {"framing": name}})) for name in framings}
-    staged = stage(next(iter(scenes.values())), options.seed)
-    lights = graphs.contents(staged.graph).lights
-    with renderer.Renderer(
-        staged.graph, size=options.size, supersample=options.supersample, seed=options.seed
-    ) as drawing:
-        if not drawing.media:
-            raise InputError(f"{scene}: nothing scatters in it; expected a material with a medium")
-        for name, definition in scenes.items():
-            with drawing.frame(definition.camera, definition.picture) as frame:
-                file = _cached(table, name, converged, options)
-                goal = _picture(frame, converged, file)
-                regions = _regions(frame, lights, options)
-                for label, technique in techniques.items():
-                    yield _row(name, label, frame, technique, goal, regions, options, distances)
+    for name, frame, lights in framed(scene, table, framings, options):
+        goal = _picture(frame, converged, _cached(table, name, converged, options))
+        regions = _regions(frame, lights, options)
+        for label, technique in techniques.items():
+            yield _row(name, label, frame, technique, goal, regions, options, distances)
 
 
 def _row(framing, label, frame, technique, goal, regions, options, distances) -> Row:

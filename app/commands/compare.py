@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
+from app import drawing
 from app.commands.media import writable
-from app.commands.render import SIZE, patch_of, size_of
 
 
 def _crop(_context, _parameter, value: str | None):
@@ -32,15 +32,7 @@ def _crop(_context, _parameter, value: str | None):
     multiple=True,
     help="close-up, head-shot or half-length, repeat for more; the scene's own camera without it.",
 )
-@click.option(
-    "--size",
-    "-s",
-    default="960x540",
-    show_default=True,
-    metavar=SIZE,
-    callback=size_of,
-    help="Size of the whole image in pixels.",
-)
+@drawing.size("960x540", "the whole image")
 @click.option(
     "--crop",
     metavar="WxH+X+Y",
@@ -77,21 +69,8 @@ def _crop(_context, _parameter, value: str | None):
     show_default=True,
     help="Of refraction of the reference's face, 1.4 for skin; 0: the medium's own.",
 )
-@click.option(
-    "--supersample",
-    type=click.IntRange(1, 4),
-    default=1,
-    show_default=True,
-    help="Computed pixels in a pixel along each side.",
-)
-@click.option(
-    "--set",
-    "patches",
-    multiple=True,
-    metavar="KEY=VALUE",
-    callback=patch_of,
-    help="A value over the scene's, by its dotted key: lights.rim=false; repeat for more.",
-)
+@drawing.supersample(1, "Computed pixels in a pixel")
+@drawing.patches("A value over the scene's, by its dotted key: lights.rim=false; repeat for more.")
 @click.option(
     "--within",
     "within_mm",
@@ -110,13 +89,7 @@ def _crop(_context, _parameter, value: str | None):
     metavar="MM",
     help="How thick a part that is lit from behind may be.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    help="Seed of the walks, of hair, skin noise and baked light.",
-)
+@drawing.seed("the walks, of hair, skin noise and baked light")
 @click.option(
     "--out",
     "-o",

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
+from app import drawing
 from app.commands.media import writable
-from app.commands.render import SIZE, patch_of, size_of
 
 
 @click.group("experiment", no_args_is_help=False)
@@ -39,22 +39,8 @@ def command() -> None:
     metavar="NAME[:KEY=VALUE...]",
     help="What pictures are compared to; golubev with 256 samples in 4 frames if not given.",
 )
-@click.option(
-    "--size",
-    "-s",
-    default="1920x1080",
-    show_default=True,
-    metavar=SIZE,
-    callback=size_of,
-    help="Size of the image in pixels.",
-)
-@click.option(
-    "--supersample",
-    type=click.IntRange(1, 4),
-    default=2,
-    show_default=True,
-    help="Computed pixels in a pixel along each side.",
-)
+@drawing.size("1920x1080", "the image")
+@drawing.supersample(2, "Computed pixels in a pixel")
 @click.option(
     "--edges",
     "edges_mm",
@@ -80,21 +66,8 @@ def command() -> None:
     show_default=True,
     help="Also the bias of techniques with rotations, from the mean of so many frames; 0: not.",
 )
-@click.option(
-    "--set",
-    "patches",
-    multiple=True,
-    metavar="KEY=VALUE",
-    callback=patch_of,
-    help="A value over the scene's, by its dotted key: lights.rim=false; repeat for more.",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    help="Seed of hair, skin noise and baked light.",
-)
+@drawing.patches("A value over the scene's, by its dotted key: lights.rim=false; repeat for more.")
+@drawing.seed("hair, skin noise and baked light")
 @click.option(
     "--keep/--no-keep",
     default=True,

@@ -4,14 +4,7 @@ from pathlib import Path
 
 import click
 
-SIZE = "WIDTHxHEIGHT"
-
-
-def size_of(_context, _parameter, value: str) -> tuple[int, int]:
-    width, cross, height = value.lower().partition("x")
-    if not (cross and width.isdigit() and height.isdigit()):
-        raise click.BadParameter(f"got {value!r}; expected {SIZE}, such as 1920x1080")
-    return int(width), int(height)
+from app import drawing
 
 
 def parameters_of(_context, _parameter, values: tuple[str, ...]) -> dict:
@@ -27,29 +20,6 @@ def parameters_of(_context, _parameter, values: tuple[str, ...]) -> dict:
         except ValueError:
             chosen[name] = text
     return chosen
-
-
-def patch_of(_context, _parameter, values: tuple[str, ...]) -> dict:
-    """--set a.b=1 --set c=text as {"a": {"b": 1}, "c": "text"}."""
-    import json
-
-    patch: dict = {}
-    for item in values:
-        keys, equals, text = item.partition("=")
-        if not equals or not all(keys.split(".")):
-            raise click.BadParameter(f"got {item!r}; expected KEY=VALUE, such as rig=noon")
-        try:
-            value = json.loads(text)
-        except ValueError:
-            value = text
-        *parents, last = keys.split(".")
-        holder = patch
-        for key in parents:
-            holder = holder.setdefault(key, {})
-            if not isinstance(holder, dict):
-                raise click.BadParameter(f"got {item!r} after a value for {key}; expected one")
-        holder[last] = value
-    return patch
 
 
 def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
@@ -73,15 +43,7 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     "-f",
     help="close-up, head-shot or half-length; the scene's own camera without it.",
 )
-@click.option(
-    "--size",
-    "-s",
-    default="1920x1080",
-    show_default=True,
-    metavar=SIZE,
-    callback=size_of,
-    help="Size of the image in pixels.",
-)
+@drawing.size("1920x1080", "the image")
 @click.option(
     "--out",
     "-o",
@@ -104,16 +66,9 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     show_default=True,
     help="The scene: a name of stimuli/scenes, or a TOML file.",
 )
-@click.option(
-    "--set",
-    "patches",
-    multiple=True,
-    metavar="KEY=VALUE",
-    callback=patch_of,
-    help=(
-        "A value over the scene's, by its dotted key, in JSON or as text: rig=noon, "
-        "camera.yaw_deg=0, lights.rim=false; repeat for more."
-    ),
+@drawing.patches(
+    "A value over the scene's, by its dotted key, in JSON or as text: rig=noon, "
+    "camera.yaw_deg=0, lights.rim=false; repeat for more."
 )
 @click.option(
     "--head",
@@ -131,20 +86,8 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     type=click.Choice(["y", "z"]),
     help="The scan's upward axis; found out and said if not given.",
 )
-@click.option(
-    "--supersample",
-    type=click.IntRange(1, 4),
-    default=2,
-    show_default=True,
-    help="Samples a pixel along each side.",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    help="Seed of hair, skin noise and baked light.",
-)
+@drawing.supersample(2, "Samples a pixel")
+@drawing.seed("hair, skin noise and baked light")
 @click.option(
     "--samples",
     type=click.Path(dir_okay=False, path_type=Path),
