@@ -111,6 +111,17 @@ def agreement(responses: Responses, options: Options) -> pd.DataFrame:
     return with_notes(rows, ["framing", "statistic", "value", "low", "high", "p"], notes)
 
 
+def consistency(responses: Responses, options: Options) -> pd.DataFrame:
+    """framing, statistic, value, low, high, p: of `agreement`, what is about circular triads, for
+    each framing.
+    """
+    rows, notes = [], bootstrap.few(responses)
+    for name, panel in panels(responses, overall=False).items():
+        triads = [*_consistency(name, panel.parts, options, notes), *_pooled(panel)]
+        rows += [(name, *one) for one in triads]
+    return with_notes(rows, ["framing", "statistic", "value", "low", "high", "p"], notes)
+
+
 def participants(responses: Responses, options: Options) -> pd.DataFrame:
     """One row a participant; see `PARTICIPANTS`.
 
@@ -345,8 +356,8 @@ def _silent(rules: Exclusions, given: Mapping[str, np.ndarray]) -> list[str]:
     ]
 
 
-def rules_in_words(options: Options) -> str:
-    """The rules of exclusion, those that the study declared apart from defaults."""
+def rules(options: Options) -> dict[str, str]:
+    """The rules of exclusion that are not off, by their names in `Exclusions`, in words."""
     words = {
         "answered_share": "answered under {:.0%} of the questions, or of the most that anybody did",
         "one_side_share": "at least {:.0%} on one side, and not by chance (p < 0.001)",
@@ -356,11 +367,16 @@ def rules_in_words(options: Options) -> str:
         "repeat_share": "under {:.0%} alike when asked again",
         "trap_share": "under {:.0%} of the trap pairs answered as is obvious",
     }
-    texts = {
+    return {
         name: text.format(getattr(options.exclusions, name)).replace("%", " %")
         for name, text in words.items()
         if getattr(options.exclusions, name) is not None
     }
+
+
+def rules_in_words(options: Options) -> str:
+    """The rules of exclusion, those that the study declared apart from defaults."""
+    texts = rules(options)
     if not texts:
         return "none"
     declared = [text for name, text in texts.items() if f"exclusions.{name}" in options.declared]

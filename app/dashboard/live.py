@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from datetime import datetime, timedelta
+from math import isnan
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +13,9 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from app import export, recruiting
+from app.dashboard import course, results
 from app.database import Database
-from app.models import Event, Live, LogEntry, Participant, Response, Trial, now
+from app.models import Event, Live, LogEntry, Participant, Response, Statement, Trial, now
 from app.study import Study
 
 if TYPE_CHECKING:
@@ -107,9 +108,11 @@ def numbers(db: Session, study: Study) -> dict[str, Any]:
             "about_other_images": about_other_images(db, study),
         },
         "participants": people[:LATEST],
-        "framings": framings(answers, study),
+        "framings": results.framings(answers, study, declared(study)),
         "sides": sides(db, study),
-        "stopped": stopped(people),
+        "pages": course.pages(study, people),
+        "stopped": course.stopped(people),
+        "times": course.times(answers),
     }
 
 
@@ -139,6 +142,11 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
     asked = dict(
         db.execute(select(Trial.participant_id, func.count()).group_by(Trial.participant_id)).all()
     )
+    stated = dict(
+        db.execute(
+            select(Statement.participant_id, func.count()).group_by(Statement.participant_id)
+        ).all()
+    )
     judged = quality(study, answers)
     result = []
     for person in db.scalars(select(Participant).order_by(Participant.id.desc())):
@@ -152,7 +160,8 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
             state = "excluded"
         if person.withdrawn_at:
             state = "withdrawn"
-        median_ms, broken = judged.get(person.code, (None, ""))
+        row = judged.get(person.code)
+        median_ms, broken = (row.median_rt_ms, row.excluded) if row else (None, "")
         flags = [broken] if broken and state != "in progress" else []  # half-way is not too little
         took_ms = (last - person.consented_at).total_seconds() * 1000
         if fastest_ms is not None and count and took_ms < count * fastest_ms:
@@ -166,6 +175,13 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
                 "began": person.consented_at.strftime("%Y-%m-%d %H:%M"),
                 "answered": count,
                 "questions": asked.get(person.id, 0),
+                "page": course.page(
+                    study.definition,
+                    person,
+                    count,
+                    asked.get(person.id, 0),
+                    stated.get(person.id, 0),
+                ),
                 "state": state,
                 "median_s": None if median_ms is None else round(median_ms / 1000, 1),
                 "flags": ", ".join(flags),
@@ -174,16 +190,46 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
     return result
 
 
-def quality(study: Study, answers: Responses | None) -> dict[str, tuple[float, str]]:
-    """Participant -> median time of an answer, ms, and the study's rules of exclusion that apply
-    (`analysis.agreement`).
+def quality(study: Study, answers: Responses | None) -> dict[str, Any]:
+    """Participant -> how they answered, with the study's rules of exclusion that apply: a row of
+    `analysis.agreement.participants`.
     """
     if answers is None:
         return {}
     from analysis.agreement import participants as judge
 
-    table = judge(answers, declared(study))
-    return {row.participant: (row.median_rt_ms, row.excluded) for row in table.itertuples()}
+    return {row.participant: row for row in judge(answers, declared(study)).itertuples()}
+
+
+def judged_by(study: Study, row: Any | None) -> list[dict[str, Any]]:
+    """Each of the study's rules of exclusion in words, what of a participant it looks at (a row of
+    `quality`), and whether they break it.
+    """
+    if row is None:
+        return []
+    from analysis.agreement import rules
+
+    options = declared(study)
+    looked_at = {
+        "answered_share": f"{row.answers} answers",
+        "one_side_share": f"{row.left} left, {row.right} right",
+        "median_rt_ms": f"{row.median_rt_ms:.0f} ms",
+        "same_answer_share": f"{100 * row.same_answer_share:.0f} %",
+        "zeta": "" if isnan(row.zeta) else f"{row.zeta:.2f}",
+        "repeat_share": f"{100 * row.repeat_share:.0f} %" if row.repeat_share >= 0 else "",
+        "trap_share": f"{100 * row.trap_share:.0f} % of {row.traps}" if row.traps else "",
+    }
+    broken = row.excluded.split("; ")
+    return [
+        {
+            "rule": name,
+            "words": text,
+            "declared": f"exclusions.{name}" in options.declared,
+            "value": looked_at[name] or "–",
+            "broken": name in broken,
+        }
+        for name, text in rules(options).items()
+    ]
 
 
 def declared(study: Study) -> Options:
@@ -195,55 +241,6 @@ def declared(study: Study) -> Options:
 def rules(study: Study) -> Exclusions:
     """The study's rules of exclusion."""
     return declared(study).exclusions
-
-
-def stopped(people: list[dict[str, Any]]) -> list[dict[str, int]]:
-    """Where people stopped: after how many answers those who dropped out or withdrew left."""
-    left = Counter(
-        one["answered"] for one in people if one["state"] in ("dropped out", "withdrawn")
-    )
-    return [{"answered": answered, "people": left[answered]} for answered in sorted(left)]
-
-
-def framings(answers: Responses | None, study: Study) -> list[dict[str, Any]]:
-    """For each framing: points and AHP priority of each technique, consistency, and what is still
-    missing.
-    """
-    if answers is None:
-        return []
-    from analysis import ahp, tallies
-
-    points = {
-        (row.framing, row.technique): row.score for row in tallies.scores(answers).itertuples()
-    }
-    totals = tallies.totals(answers).set_index("framing")
-    result = []
-    for framing, comparison in ahp.comparisons(answers).items():
-        complete = len(comparison.items) == len(study.techniques) and not comparison.missing
-        priorities = ahp.priorities(comparison.matrix) if complete else None
-        most = max(points[framing, name] for name in comparison.items) or 1
-        result.append(
-            {
-                "name": framing,
-                "label": answers.codebook.framing_label(framing),
-                "total": int(totals.total[framing]),
-                "answers": int(totals.answers[framing]),
-                "coherence": priorities.sentence()
-                if priorities
-                else "Some pairs have no answer yet.",
-                "techniques": [
-                    {
-                        "name": name,
-                        "label": answers.codebook.label(name),
-                        "score": int(points[framing, name]),
-                        "score_share": float(points[framing, name] / most),
-                        "priority": float(priorities.vector[i]) if priorities else None,
-                    }
-                    for i, name in enumerate(comparison.items)
-                ],
-            }
-        )
-    return result
 
 
 def about_other_images(db: Session, study: Study) -> int:

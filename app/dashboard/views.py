@@ -173,10 +173,14 @@ def participant(code: str):
     """One person: what they are flagged for, and leaving them out or letting them count again."""
     with database().read() as db:
         someone = _someone(db, code)
-        people = live.participants(db, study(), live.responses(db, study()))
+        answers = live.responses(db, study())
+        people = live.participants(db, study(), answers)
         row = next(one for one in people if one["code"] == someone.code)
         entries = _entries(db, LogEntry.detail.startswith(f"{someone.code}: "))
-    return render_template("dashboard/participant.html", person=someone, row=row, log=entries)
+    rules = live.judged_by(study(), live.quality(study(), answers).get(someone.code))
+    return render_template(
+        "dashboard/participant.html", person=someone, row=row, rules=rules, log=entries
+    )
 
 
 @blueprint.post("/participants/<code>")

@@ -581,6 +581,35 @@ def test_the_dashboard_refreshes_by_itself(page, address, app):
     expect(page.locator(".figures dd").first).to_have_text("1", timeout=10_000)
 
 
+@pytest.mark.parametrize(("width", "longest"), [(390, 2200), (1280, 2900)])
+def test_the_dashboard_folds_on_a_phone_and_axe_finds_nothing(
+    page, address, app, person, width, longest
+):
+    from axe_playwright_python.sync_playwright import Axe
+
+    from app import password
+
+    for k in range(3):
+        person().begin().answer(*[(i * (k + 2)) % 5 - 2 for i in range(30)])
+    page.set_viewport_size({"width": width, "height": 720})
+    page.goto(f"{address}dashboard/")
+    page.fill("[name=password]", password.reset(app.extensions["database"]))
+    page.click("button:has-text('Log in')")
+    expect(page.locator("#fold-results .results").first).to_be_visible()
+    size = page.evaluate("[document.body.scrollHeight, document.documentElement.scrollWidth]")
+    assert size[0] < longest and size[1] == width  # tables scroll within the page
+    balance = page.locator("#fold-balance")
+    assert balance.evaluate("one => one.open") == (width > 500)
+    page.click("#fold-balance summary")
+    assert balance.evaluate("one => one.open") == (width < 500)
+    person().begin()  # what changes is put in its place, and what was folded stays as it is
+    expect(page.locator(".figures dd").first).to_have_text("4", timeout=10_000)
+    assert balance.evaluate("one => one.open") == (width < 500)
+    page.evaluate("for (const one of document.querySelectorAll('details')) one.open = true")
+    violations = Axe().run(page, options=RULES).response["violations"]
+    assert [(one["id"], one["nodes"][0]["html"]) for one in violations] == []
+
+
 def test_the_simulated_study_is_marked(page, study_dir):
     with running(create_app(study_dir, simulated=True)) as address:
         page.goto(address)

@@ -12,7 +12,10 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy import func, select
 
+from analysis.agreement import consistency
+from analysis.options import Options
 from analysis.responses import read_responses
+from analysis.worth import worths
 from app.dashboard import live
 from app.models import Event, Live, Participant, Response, Trial, now
 
@@ -281,3 +284,79 @@ def test_completion_codes_can_be_checked_and_say_nothing_else(person, experiment
         experimenter.send("code", code=other)
         assert "not given by this study" in experimenter.page.text
     assert "<script>" not in experimenter.page.text and key not in "".join(rows)
+
+
+def test_worths_and_triads_are_those_of_the_analysis(person, experimenter, tmp_path):
+    """Of the downloaded table: the live numbers are what `analysis` makes of it."""
+    for k in range(6):
+        person().begin().answer(*[(i * (k + 2)) % 5 - 2 for i in range(30)])
+    (tmp_path / "responses.csv").write_bytes(experimenter.get("/dashboard/responses.csv").data)
+    answers, chosen = read_responses(tmp_path / "responses.csv"), Options()
+    table = worths(answers, chosen)
+    table = table[table.model == "thurstone_jod"].set_index(["framing", "technique"])
+    circular = consistency(answers, chosen).set_index(["framing", "statistic"]).value
+    numbers = experimenter.get("/dashboard/live.json").json
+    for framing in numbers["framings"]:
+        assert framing["unit"] == "JOD" and framing["level"] == "95"
+        for one in framing["techniques"]:
+            row = table.loc[framing["name"], one["name"]]
+            assert [one["low"], one["worth"], one["high"]] == pytest.approx(
+                [row.low, row.estimate, row.high], abs=1e-9
+            )
+            assert 0 <= one["from"] <= one["at"] <= one["to"] <= 100
+        triads = framing["triads"]
+        assert triads["mean"] == pytest.approx(circular[framing["name"], "circular_triads"])
+        # five techniques have ten triads, each in a circle one time in four
+        assert triads["guessing"] == 2.5
+        assert framing["pairs"] == {"least": 6, "most": 6}
+    assert "by guessing" in numbers["html"]
+
+
+def test_numbers_that_do_not_exist_are_no_numbers(person, experimenter):
+    """JSON has no NaN; nobody saw a difference, so there is no worth to estimate."""
+    person().begin().answer(0, 0, 0)
+    text = experimenter.get("/dashboard/live.json").text
+    assert "NaN" not in text and "Infinity" not in text
+    for framing in json.loads(text)["framings"]:
+        assert {one["low"] for one in framing["techniques"]} == {None}
+        assert framing["notes"]
+
+
+def test_on_which_page_people_stop_and_how_long_they_take(person, experimenter, app):
+    person().begin().answer(*[1] * 30)
+    person().begin().answer(1, 1)
+    person().begin()
+    undecided = person()
+    undecided.get("/")
+    undecided.send("consent", consent="yes")
+    with app.extensions["database"].write() as db:
+        for one in db.scalars(select(Participant).where(Participant.id.in_([3, 4]))):
+            one.consented_at -= timedelta(hours=1)
+    numbers = experimenter.get("/dashboard/live.json").json
+    pages = [(one["page"], one["came"], one["stopped"]) for one in numbers["pages"]]
+    assert pages == [
+        ("Self-rating", 4, 1),
+        ("Questions 1 to 5", 3, 1),
+        ("Questions 6 to 10", 1, 0),
+        ("Questions 11 to 15", 1, 0),
+        ("Questions 16 to 20", 1, 0),
+        ("Questions 21 to 25", 1, 0),
+        ("Questions 26 to 30", 1, 0),
+        ("Finished", 1, 0),
+    ]
+    everything = numbers["times"][-1]
+    assert (everything["label"], everything["median"]) == ("All", 0.32)  # 321 ms each
+
+
+def test_a_person_is_held_to_each_declared_rule(person, experimenter):
+    person().begin().answer(*[2] * 30)
+    page = " ".join(experimenter.get("/dashboard/participants/P0001").text.split())
+    assert "the same answer at least 95 % of the time" in page
+    rows = re.findall(r'class="words">(.*?)</th><td class="number">(.*?)</td><td>(.*?)</td>', page)
+    by_rule = {re.sub(" <.*", "", words): (value, broken) for words, value, broken in rows}
+    assert by_rule["the same answer at least 95 % of the time"] == ("100 %", "yes")
+    assert by_rule["at least 90 % on one side, and not by chance (p &lt; 0.001)"] == (
+        "0 left, 30 right",
+        "yes",
+    )
+    assert by_rule["median answer under 500 ms"] == ("321 ms", "yes")
