@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +17,7 @@ from renderer.scene import shapes
 from stimuli.compare import chosen
 from stimuli.errors import InputError
 
+DOCS = Path(__file__).parents[2] / "docs"
 SCENE = """
 subject = "floor"
 objects.floor = { shape = "slab", size_mm = [60.0, 60.0, 20.0] }
@@ -137,3 +139,13 @@ def test_techniques_are_listed(run):
     assert code == 0 and out.startswith("golubev: ") and "samples = 22" in out
     code, _, err = run("techniques", "golub")
     assert code == 2 and "no technique 'golub'" in err
+
+
+def test_the_page_of_parameters_is_what_the_command_says(run):
+    """Its tables hold every parameter of every technique; a change of one is a change of it."""
+    code, out, _ = run("techniques", "--markdown")
+    assert code == 0 and out == (DOCS / "parameters.md").read_text(encoding="utf-8")
+    common, *sections = out.split("\n## ")[1:]
+    for section, kind in zip(sections, renderer.TECHNIQUES.values(), strict=True):
+        for name in kind.names():
+            assert f"| `{name}` |" in section or f"| `{name}` |" in common
