@@ -1,4 +1,6 @@
-"""Techniques beside the truth: how far each is from `reference`, where, and how it looks."""
+"""Techniques beside the truth: how far each is from `reference`, or from another technique, where,
+and how it looks.
+"""
 
 from __future__ import annotations
 
@@ -76,12 +78,14 @@ class Row:
 
 @dataclass(frozen=True)
 class Shot:
-    """A framing: images (H, W, 3) uint8 of the crop by technique, the truth's under "reference",
-    another one of half of its walks; noise (3,): standard error of its light, of a computed pixel,
-    in the unit of Row.rmse; residual (3,): see renderer.reference.estimate.Walked.
+    """A framing: images (H, W, 3) uint8 of the crop by technique, the truth's under the name
+    `truth`, another one of half of its walks; noise (3,): standard error of its light, of a
+    computed pixel, in the unit of Row.rmse; residual (3,): see renderer.reference.estimate.Walked.
+    Where the truth is a technique, half is its image and noise and residual are 0.
     """
 
     framing: str
+    truth: str
     images: dict[str, np.ndarray]
     half: np.ndarray
     rows: tuple[Row, ...]
@@ -122,11 +126,14 @@ def compare(
     techniques: Mapping[str, Any],
     options: Options,
     distances: Distances,
+    against: Mapping[str, Any] | None = None,
 ) -> list[Shot]:
-    """Every technique at every framing ("": the scene's own camera), beside the reference."""
+    """Every technique at every framing ("": the scene's own camera), beside the reference, or
+    beside the one technique that is named in `against`.
+    """
     table = merge(load_table(scene), patch)
     return [
-        _shot(name, frame, lights, techniques, options, distances)
+        _shot(name, frame, lights, techniques, options, distances, against)
         for name, frame, lights in framed(scene, table, framings, options)
     ]
 
@@ -156,7 +163,9 @@ def framed(
                 yield name, frame, lights
 
 
-def _shot(framing, frame, lights, techniques, options: Options, distances: Distances) -> Shot:
+def _shot(
+    framing, frame, lights, techniques, options: Options, distances: Distances, against
+) -> Shot:
     from renderer import make
     from renderer.reference.estimate import rms_error
 
@@ -165,7 +174,7 @@ def _shot(framing, frame, lights, techniques, options: Options, distances: Dista
     wide = tuple(slice(part.start * s, part.stop * s) for part in window)
     frame.renderer.context.make_current()
     own = {name: getattr(options, name) for name in ("walks", "pool_mm", "seed", "light", "index")}
-    truth = make("reference", own)
+    label, truth = next(iter((against or {"reference": make("reference", own)}).items()))
     inside = np.zeros((frame.height, frame.width), bool)
     inside[wide] = True
     halves, scatters, regions, residual = _truth(frame, truth, lights, inside, options)
@@ -178,12 +187,19 @@ def _shot(framing, frame, lights, techniques, options: Options, distances: Dista
     means = np.stack([pooled(half, s)[window] for half in halves])
     masks = {name: pooled(mask * 1.0, s)[window] == 1 for name, mask in regions.items()}
     masks = {name: mask for name, mask in masks.items() if mask.sum() >= FEWEST}
-    images = {"reference": _developed(frame, halves.mean(axis=0), truth)[window]}
-    half = _developed(frame, halves[0], truth)[window]
-    truths, rows = (half, images["reference"]), []
+    if against:  # developed as it is, with the albedo that it has taken in
+        with frame.scatter(truth) as target:
+            half = frame.develop(target.textures[0], truth)[window]
+        images = {label: half}
+    else:
+        images = {label: _developed(frame, halves.mean(axis=0), truth)[window]}
+        half = _developed(frame, halves[0], truth)[window]
+    truths, rows = (half, images[label]), []
     for name, technique in techniques.items():
+        if name == label:
+            continue
         with frame.scatter(technique) as target:
-            light = target.textures[0].read()[..., :3] / albedo**technique.texturing
+            light = _bare(target, albedo, technique)
             images[name] = frame.develop(target.textures[0], technique)[window]
         light = pooled(light, s)[window]
         maps = {
@@ -197,7 +213,12 @@ def _shot(framing, frame, lights, techniques, options: Options, distances: Dista
             numbers = [tuple(map(float, part)) for part in (rmse, error, ratio)]
             rows.append(Row(framing, name, region, int(mask.sum()), *numbers, measures))
     noise = np.sqrt(((halves[0] - halves[1])[scatters] ** 2).mean(axis=0)) / 2 / unit
-    return Shot(framing, images, half, tuple(rows), noise, residual)
+    return Shot(framing, label, images, half, tuple(rows), noise, residual)
+
+
+def _bare(target, albedo: np.ndarray, technique) -> np.ndarray:
+    """Scattered light (H, W, 3) without the albedo that a technique has taken in."""
+    return target.textures[0].read()[..., :3] / albedo**technique.texturing
 
 
 def _crop(options: Options) -> tuple[int, int, int, int]:
@@ -226,13 +247,19 @@ def _truth(frame, truth, lights, inside: np.ndarray, options: Options):
     names = ("skin", "shadow edges", "back-lit")
     regions = {name: np.zeros(shape, bool) for name in names}
     residual = np.zeros(3)
+    walks = truth.domain == "walks"
+    if not walks:
+        albedo = np.maximum(frame.surface.textures[2].read()[..., :3], 1e-6)
+        with frame.scatter(truth) as target:
+            light = _bare(target, albedo, truth)
     for medium in range(1, len(frame.renderer.media) + 1):
         inputs = frame.inputs(False, medium=medium)
         where = (inputs.irradiance.read()[..., 3] > 0.5) & inside
         if not where.any():
             continue
-        halves[:, where] = truth.halves(inputs, where).values
-        residual = np.maximum(residual, medium_of(inputs.room, options.index).residual)
+        halves[:, where] = truth.halves(inputs, where).values if walks else light[where]
+        if walks:
+            residual = np.maximum(residual, medium_of(inputs.room, options.index).residual)
         solid = Solid([part_of(drawn) for drawn in inputs.room.surfaces])
         depths = inputs.depths.read()[..., 0]
         points, normals, seen = visible(solid, inputs.room.camera, depths, where)
@@ -298,14 +325,14 @@ def sheet(shot: Shot, columns: int = 4, zoom: int = 1) -> Image.Image:
     """
     from matplotlib import colormaps
 
-    truth = shot.images["reference"]
+    truth = shot.images[shot.truth]
     maps = {
-        name: colour_difference(truth, shot.half if name == "reference" else image)
+        name: colour_difference(truth, shot.half if name == shot.truth else image)
         for name, image in shot.images.items()
     }
-    others = [maps[name] for name in maps if name != "reference"]
+    others = [maps[name] for name in maps if name != shot.truth]
     top = max(1.0, float(np.ceil(np.quantile(np.stack(others), 0.995)))) if others else 1.0
-    order = [name for name in shot.images if name != "reference"] + ["reference"]
+    order = [name for name in shot.images if name != shot.truth] + [shot.truth]
     height, width = (side * zoom for side in truth.shape[:2])
     columns = min(columns, len(order))
     lines = -(-len(order) // columns)
@@ -325,13 +352,13 @@ def sheet(shot: Shot, columns: int = 4, zoom: int = 1) -> Image.Image:
         for row, picture in enumerate(shown):
             tile = Image.fromarray(picture).resize((width, height), Image.Resampling.NEAREST)
             page.paste(tile, (x, y + BAND_PX + row * (height + GAP_PX)))
-    _bar(page, draw, font, colours, top, lines * cell[1])
+    _bar(page, draw, font, colours, top, lines * cell[1], shot.truth)
     return page
 
 
-def _bar(page, draw, font, colours, top: float, y: int) -> None:
+def _bar(page, draw, font, colours, top: float, y: int, truth: str) -> None:
     """The colour map with its numbers, at the foot of a page."""
-    words = "CIEDE2000 to the reference"
+    words = f"CIEDE2000 to {'the ' if truth == 'reference' else ''}{truth}"
     start = int(draw.textlength(words, font=font)) + 24
     draw.text((8, y + BAR_PX / 2), words, font=font, fill=INK, anchor="lm")
     span = max(32, min(400, page.width - start - 60))

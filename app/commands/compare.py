@@ -26,6 +26,13 @@ def _crop(_context, _parameter, value: str | None):
     help="A technique with its parameters, golubev:samples=512, or all; repeat for more.",
 )
 @click.option(
+    "--against",
+    default="reference",
+    show_default=True,
+    metavar="NAME[:KEY=VALUE...]",
+    help="What they are compared to: a technique of its own in the reference's place.",
+)
+@click.option(
     "--framing",
     "-f",
     "framings",
@@ -116,7 +123,7 @@ def _crop(_context, _parameter, value: str | None):
     help="Pixels of the sheet for a pixel, along each side.",
 )
 def command(
-    scene, techniques, framings, crop, patches, out, table, columns, zoom, **options
+    scene, techniques, against, framings, crop, patches, out, table, columns, zoom, **options
 ) -> None:
     """Say how far techniques are from the truth in SCENE, a name of stimuli/scenes or a TOML file.
 
@@ -127,15 +134,22 @@ def command(
     """
     from analysis.objective import MAPS
     from stimuli.compare import Options, chosen, compare, sheet, write_table
+    from stimuli.errors import InputError
 
     if out:
         writable(out, (".png",))
     if table:
         writable(table, (".csv",))
-    shots = compare(
-        scene, patches, framings or [""], chosen(techniques), Options(crop=crop, **options), MAPS
-    )
+    other = None if against == "reference" else chosen([against])
+    if other and len(other) != 1:
+        raise InputError(f"--against is {against!r}; expected one technique")
+    settings = Options(crop=crop, **options)
+    shots = compare(scene, patches, framings or [""], chosen(techniques), settings, MAPS, other)
     for shot in shots:
+        if other:
+            click.echo(f"{shot.framing}: against {shot.truth}")
+            _print([row.cells() for row in shot.rows])
+            continue
         noise = " / ".join(f"{v:.4f}" for v in shot.noise)
         residual = " / ".join(f"{v:.4f}" for v in shot.residual)
         click.echo(

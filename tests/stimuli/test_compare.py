@@ -109,12 +109,36 @@ def test_a_table_and_a_sheet(run, tmp_path):
         assert page.width == 3 * 48 + 2 * 4
 
 
+def test_six_gaussians_over_the_atlas_and_over_the_screen_are_one_picture(run, tmp_path):
+    """On a flat slab under the shadows of bars: DSSIM below 0.002 (0.0007 at 480x270,
+    docs/techniques.md), a hundredth of what leaving scattering out makes."""
+    techniques = ("-t", "none", "-t", "deon_luebke:texturing=0:size=1024")
+    where = (DOCS / "scenes" / "bars.toml", "--size", "240x135", "--table", "table.csv")
+    code, out, err = run(
+        "compare", *where, *techniques, "--against", "jimenez_gaussian:texturing=0"
+    )
+    assert code == 0, err
+    assert "against jimenez_gaussian texturing=0" in out and "standard error" not in out
+    rows = {
+        row["technique"]: row
+        for row in csv.DictReader((tmp_path / "table.csv").open())
+        if row["region"] == "skin"
+    }
+    without, atlas = rows["none"], rows["deon_luebke texturing=0 size=1024"]
+    assert float(atlas["dssim"]) < 0.002 and float(without["dssim"]) > 0.05
+    for channel in "rgb":
+        assert float(atlas[f"rmse_{channel}"]) < 0.015
+        assert float(atlas[f"ratio_{channel}"]) == pytest.approx(1, abs=0.005)
+    assert atlas["dssim_half"] == atlas["dssim"] and float(atlas["error_r"]) < 1e-3
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [
         (("--crop", "90x20+0+0"), "the crop 90x20+0+0 does not fit"),
         (("--crop", "20,20"), "expected WIDTHxHEIGHT+X+Y"),
         (("--walks", 3), "reference.walks is 3; expected an even number"),
+        (("--against", "all"), "--against is 'all'; expected one technique"),
         (("--out", "sheet.gif"), "expected a file name that ends in .png"),
         (("--set", "objects.floor.material=bar"), "nothing scatters in it"),
     ],
