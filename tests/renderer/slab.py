@@ -148,8 +148,12 @@ def places(frame):
     return frame.view.eye + rays * depth[..., None], frame.surface.textures[0].read()[..., 3] > 0
 
 
-def surface_edge_response(technique, tilt_deg=0.0, size=(240, 60), height_mm=5.0, **material):
-    """As `edge_response`, for a technique over the surfaces of a scene: a slab of 24 mm.
+def surface_response(
+    technique, light, tilt_deg=0.0, size=(240, 60), height_mm=5.0, within_mm=8.0, **material
+):
+    """(u (W,), mean (W, 3), standard error (W, 3)) as `edge_response`, for a technique over the
+    surfaces of a scene: a slab of 24 mm under light(u), u in mm along it. Rows near its top and
+    bottom do not count.
 
     material: what goes over the slab's own.
     """
@@ -170,17 +174,52 @@ def surface_edge_response(technique, tilt_deg=0.0, size=(240, 60), height_mm=5.0
         },
     }
 
-    def edge(place):  # a ramp as wide as a texel of 1024 of the slab's atlas
-        share = np.clip(0.5 - place @ along / 0.073, 0, 1)
-        return np.repeat(share[..., None], 3, axis=-1)
+    def given(place):
+        return np.repeat(light(place @ along)[..., None], 3, axis=-1)
 
     graph = scenes.stage(scenes.read_scene(table)).graph
     with renderer.Renderer(graph, size, 1, rays=8, shadow_map=64) as drawing:
         with drawing.frame() as frame:
-            with technique.scatter(lit(frame, edge)).target as target:
+            with technique.scatter(lit(frame, given)).target as target:
                 got = target.textures[0].read()[..., :3].astype(float)
             where, _ = places(frame)
     rows = got[10:-10]
     u = (where @ along)[size[1] // 2]
-    near = np.abs(u) < 8.0
+    near = np.abs(u) < within_mm
     return u[near], rows.mean(axis=0)[near], rows.std(axis=0)[near] / np.sqrt(len(rows))
+
+
+RAMP_MM = 0.073  # as wide as a texel of 1024 of the slab's atlas
+
+
+def edge(u):
+    """Light where u < 0, over a ramp."""
+    return np.clip(0.5 - u / RAMP_MM, 0, 1)
+
+
+def stripes(u, stripe_mm=1.0):
+    """Bright and dark stripes, a bright one about 0, over ramps."""
+    return edge(np.abs(np.mod(u + stripe_mm, 2 * stripe_mm) - stripe_mm) - stripe_mm / 2)
+
+
+def left(u, response, stripe_mm=1.0):
+    """Amplitude (3,) that is left of stripes, from the middles of bright and dark ones."""
+    phase = np.mod(u / stripe_mm + 0.5, 2.0)
+    middle = np.abs(np.mod(phase, 1.0) - 0.5) < 0.06
+    bright, dark = (response[middle & side].mean(axis=0) for side in (phase < 1, phase >= 1))
+    return bright - dark
+
+
+def left_of(edge_of, stripe_mm=1.0, reach_mm=60.0):
+    """As `left`, of a kernel whose answer to an edge is edge_of (N,) mm -> (N, 3)."""
+    n = np.arange(-reach_mm, reach_mm + 1)[:, None]
+    sides = stripe_mm * (2 * n + [[-0.5, 0.5]])
+    return sum(
+        sign * (edge_of(x - sides[:, 1]) - edge_of(x - sides[:, 0])).sum(axis=0)
+        for x, sign in ((0.0, 1), (stripe_mm, -1))
+    )
+
+
+def surface_edge_response(technique, tilt_deg=0.0, size=(240, 60), height_mm=5.0, **material):
+    """`surface_response` to an edge of light where u < 0."""
+    return surface_response(technique, edge, tilt_deg, size, height_mm, **material)

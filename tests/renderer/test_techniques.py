@@ -9,7 +9,15 @@ import renderer
 from renderer import gl
 from renderer.errors import InputError
 from renderer.optics import media
-from tests.renderer.slab import edge_response, rms, scatter, width_mm
+from tests.renderer.slab import (
+    edge_response,
+    left,
+    left_of,
+    rms,
+    scatter,
+    stripes,
+    width_mm,
+)
 
 NAMES = list(renderer.TECHNIQUES)
 #: Those that filter a picture; what filters surfaces has the same checks in files of its own.
@@ -94,20 +102,21 @@ def test_red_travels_farther_than_green_and_blue(name, patch):
 
 
 #: Sampling error of each technique beside its fit's, rms over 6 mm of an edge, and how far an
-#: edge's width may be from the curve's at 30 and 60 degrees of tilt, as a share, with the reason.
+#: edge's width may be from the curve's at 30 and 60 degrees of tilt, as a share, with the reason;
+#: and how much more than by the fit what is left of stripes of 1 mm may be off.
 BOUNDS = {
     # seven taps a Gaussian, bilinear between texels; blue is three texels wide
-    "jimenez_gaussian": (0.010, 0.12, 0.12),
+    "jimenez_gaussian": (0.010, 0.12, 0.12, 0.006),
     # taps of an interval, spread by rotation near the centre alone: the widest are 1 mm apart
-    "jimenez_separable": (0.012, 0.12, 0.25),
+    "jimenez_separable": (0.012, 0.12, 0.25, 0.06),
     # 22 rotated samples: what lies beyond the farthest is missing
-    "golubev": (0.006, 0.16, 0.16),
+    "golubev": (0.006, 0.16, 0.16, 0.015),
     # 12 samples where contrast is low: the tail is cut earlier, and who is active is biased; no
     # sample of either set is as near as Golubev's first, so that blue's edge is wider
-    "golubev_plus": (0.010, 0.20, 0.36),
-    "golubev_adaptive": (0.006, 0.16, 0.16),
+    "golubev_plus": (0.010, 0.20, 0.36, 0.015),
+    "golubev_adaptive": (0.006, 0.16, 0.16, 0.012),
     # three taps where light is even: two rings cannot follow red's far end
-    "subdermal": (0.011, 0.16, 0.16),
+    "subdermal": (0.011, 0.16, 0.16, 0.07),
 }
 
 
@@ -123,6 +132,20 @@ def test_a_slab_answers_as_the_medium_within_fit_and_sampling_error(name, depth_
     miss = rms(u, got, SKIN, 6.0)
     allowed = fitted + BOUNDS[name][0] + 3 * error[near].mean(axis=0)
     assert (miss <= allowed).all(), f"rms {miss}, fit {fitted}, standard error {error.mean():.1e}"
+
+
+@pytest.mark.parametrize("name", SCATTERING)
+def test_stripes_of_a_millimetre_fade_as_the_medium_says(name, bare):
+    """Face-on, a pixel is 0.05 mm; what filters surfaces: test_surfaces.py."""
+    technique, shape = renderer.make(name), (120, 640)
+    u = (np.arange(shape[1]) + 0.5 - shape[1] / 2) * 480.0 / 9000.0
+    light = np.tile(stripes(u)[None, :, None], (shape[0], 1, 3))
+    out, _ = scatter(technique, bare.flat(light, SKIN, 480.0, 9000.0))
+    fit, curve = left_of(lambda x: technique.edge(SKIN, x)), left_of(SKIN.edge)
+    inside = np.abs(u) < 9.0
+    miss = np.abs(left(u[inside], out.mean(axis=0)[inside]) - curve)
+    allowed = np.abs(fit - curve) + BOUNDS[name][3]
+    assert (miss < allowed).all(), f"off by {miss}, of which the fit {np.abs(fit - curve)}"
 
 
 @pytest.mark.parametrize("name", SCATTERING)
