@@ -184,6 +184,7 @@ def _shot(
     albedo = np.maximum(frame.surface.textures[2].read()[..., :3], 1e-6)
     strongest = np.max([light.irradiance for light in lights], axis=0) if lights else 0
     unit = np.where(strongest > 0, strongest, own[scatters].mean(axis=0))
+    unit = np.where(unit > 0, unit, 1.0)  # a colour of which there is no light at all
     means = np.stack([pooled(half, s)[window] for half in halves])
     masks = {name: pooled(mask * 1.0, s)[window] == 1 for name, mask in regions.items()}
     masks = {name: mask for name, mask in masks.items() if mask.sum() >= FEWEST}
@@ -208,12 +209,17 @@ def _shot(
         }
         for region, mask in masks.items():
             rmse, error = rms_error(light[mask] / unit, means[:, mask] / unit)
-            ratio = light[mask].mean(axis=0) / means.mean(axis=0)[mask].mean(axis=0)
+            ratio = _ratio(light[mask].mean(axis=0), means.mean(axis=0)[mask].mean(axis=0))
             measures = {k: tuple(float(m[mask].mean()) for m in both) for k, both in maps.items()}
             numbers = [tuple(map(float, part)) for part in (rmse, error, ratio)]
             rows.append(Row(framing, name, region, int(mask.sum()), *numbers, measures))
     noise = np.sqrt(((halves[0] - halves[1])[scatters] ** 2).mean(axis=0)) / 2 / unit
     return Shot(framing, label, images, half, tuple(rows), noise, residual)
+
+
+def _ratio(light: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """light over truth (C,), 1 where neither has any."""
+    return np.divide(light, truth, out=np.where(light > 0, np.inf, 1.0), where=truth > 0)
 
 
 def _bare(target, albedo: np.ndarray, technique) -> np.ndarray:

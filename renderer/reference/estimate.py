@@ -109,12 +109,14 @@ def rms_error(values: np.ndarray, halves: np.ndarray) -> tuple[np.ndarray, np.nd
     noise, and its standard error (C,).
 
     The halves are independent, so that (v - a)(v - b) is (v - truth)^2 on average. Noise can leave
-    its mean below 0 where hardly anything differs: the root is then given as negative.
+    its mean below 0 where hardly anything differs: the root is then given as negative. Both are 0
+    where nothing differs at all.
     """
     squares = (values - halves[0]) * (values - halves[1])
     mean = squares.mean(axis=0)
     rms = np.sign(mean) * np.sqrt(np.abs(mean))
-    return rms, squares.std(axis=0) / np.sqrt(len(squares)) / (2 * np.abs(rms))
+    spread = squares.std(axis=0) / np.sqrt(len(squares))
+    return rms, np.divide(spread, 2 * np.abs(rms), out=np.zeros_like(rms), where=rms != 0)
 
 
 def estimate(
@@ -135,37 +137,69 @@ def estimate(
     a number of each point, which decides its walks together with the seed. What takes longer than
     SAVE_EVERY_S is kept in the cache while it runs (`keep`), and taken up from there.
     """
-    from tqdm import tqdm
-
-    file = None
-    if keep:
-        key = _key(solid, medium.medium, points, index, light, seed)
-        file = caches.folder() / "reference" / f"{key}-{walks}.npz"
     half, channels = walks // 2, medium.medium.channels
     sums = np.zeros((2, 2, len(points), channels))  # under the light and under 1, by half
-    done = take_up(file, sums, half)
     # so many walks of a point at a time that small pictures fill a block too
     together = max(1, min(half, BLOCK // max(2 * len(points), 1)))
+    name = f"{_key(solid, medium.medium, points, index, light, seed)}-{walks}" if keep else None
+
+    def add(done: int, count: int) -> None:
+        _add(sums, solid, medium.medium, points, normals, index, light, done, count, seed)
+
+    def halves(done: int) -> Halves:
+        return Halves(*sums / (done * medium.albedo), done)
+
+    accumulate(name, sums, half, together, add, halves, "walk")
+    return halves(half)
+
+
+def accumulate(
+    name: str | None,
+    sums: np.ndarray,
+    half: int,
+    together: int,
+    add: Callable[[int, int], None],
+    halves: Callable[[int], Halves],
+    unit: str,
+) -> None:
+    """Add to sums until each half has `half` units: add(done, count) adds the next `count`, at most
+    `together`, to both; halves(done) is what they come to.
+
+    name: of the file in the cache, None for none. What takes longer than SAVE_EVERY_S is kept while
+    it runs and taken up from there. Only whole steps are kept: what is interrupted within one goes
+    on from the last that was, so that nothing is counted twice.
+    """
+    from tqdm import tqdm
+
+    file = caches.folder() / "reference" / f"{name}.npz" if name else None
+    done, whole = take_up(file, sums, half), True
     started = saved = time.monotonic()
     bar = tqdm(
-        total=half * 2, initial=done * 2, desc="reference", unit="walk", disable=None, leave=False
+        total=half * 2,
+        initial=done * 2,
+        desc="reference",
+        unit=unit,
+        unit_scale=half > 10_000,
+        disable=None,
+        leave=False,
     )
     try:
         while done < half:
             count = min(together, half - done)
-            _add(sums, solid, medium.medium, points, normals, index, light, done, count, seed)
+            whole = False
+            add(done, count)
             done += count
+            whole = True
             bar.update(2 * count)
-            noise = Halves(*sums / (done * medium.albedo), done).noise
-            bar.set_postfix_str(f"standard error {' '.join(f'{v:.4f}' for v in noise)}")
+            noise = " ".join(f"{v:.4f}" for v in halves(done).noise)
+            bar.set_postfix_str(f"standard error {noise}")
             if time.monotonic() - saved > SAVE_EVERY_S:
                 save(file, sums, done)
                 saved = time.monotonic()
     finally:
         bar.close()
-        if time.monotonic() - started > SAVE_EVERY_S:
+        if whole and time.monotonic() - started > SAVE_EVERY_S:
             save(file, sums, done)
-    return Halves(*sums / (half * medium.albedo), half)
 
 
 def _add(

@@ -11,17 +11,15 @@ face itself mirrors is left out: highlights are drawn with the picture.
 from __future__ import annotations
 
 import hashlib
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from renderer import caches
 from renderer.optics import fresnel
 from renderer.passes.bake import frames, seen
-from renderer.reference.estimate import SAVE_EVERY_S, Halves, Walked, save, take_up
+from renderer.reference.estimate import Halves, Walked, accumulate
 from renderer.reference.walk import FAR, INWARD_MM, Part, Solid, walk
 from renderer.scene.lights import DistantLight, Light
 from renderer.scene.shapes import points_on
@@ -173,43 +171,25 @@ def trace(
     As `estimate` gives it: even diffuse light on a flat half-space stays as it is. What takes
     longer than SAVE_EVERY_S is kept in the cache while it runs (`keep`), and taken up from there.
     """
-    from tqdm import tqdm
-
-    file = None
-    if keep:
-        key = _key(scene, medium, eye, seed)
-        file = caches.folder() / "reference" / f"{key}-{photons}.npz"
     eta, channels = float(medium.medium.eta), medium.medium.channels
     passed = 1 - fresnel.diffuse_reflectance(1 / eta) if eta != 1 else 1.0
     unit = medium.albedo * passed  # of even light, what a half-space sends back
     count = int((eye.number >= 0).sum())
     importance = eye.importance(scene, NEAR_DMFP * float(medium.medium.dmfp.max()))
     sums = np.zeros((2, count, channels))
-    done = take_up(file, sums, photons)
-    started = saved = time.monotonic()
-    bar = tqdm(
-        total=photons * 2, initial=done * 2, desc="reference", unit="photon", disable=None,
-        unit_scale=True, leave=False,
-    )  # fmt: skip
-    try:
-        while done < photons:
-            block = min(BLOCK, photons - done)
-            for half in (0, 1):
-                for c in range(channels):
-                    rng = np.random.default_rng([seed, done, half, c])
-                    found = _block(scene, medium, eye, importance, c, block, rng, unit[c])
-                    sums[half, :, c] += block * found
-            done += block
-            bar.update(2 * block)
-            noise = Halves(sums / done, np.ones_like(sums), done).noise
-            bar.set_postfix_str(f"standard error {' '.join(f'{v:.4f}' for v in noise)}")
-            if time.monotonic() - saved > SAVE_EVERY_S:
-                save(file, sums, done)
-                saved = time.monotonic()
-    finally:
-        bar.close()
-        if time.monotonic() - started > SAVE_EVERY_S:
-            save(file, sums, done)
+
+    def add(done: int, block: int) -> None:
+        for half in (0, 1):
+            for c in range(channels):
+                rng = np.random.default_rng([seed, done, half, c])
+                found = _block(scene, medium, eye, importance, c, block, rng, unit[c])
+                sums[half, :, c] += block * found
+
+    def halves(done: int) -> Halves:
+        return Halves(sums / done, np.ones_like(sums), done)
+
+    name = f"{_key(scene, medium, eye, seed)}-{photons}" if keep else None
+    accumulate(name, sums, photons, BLOCK, add, halves, "photon")
     return Halves(sums / photons, np.ones_like(sums), photons // max(count, 1))
 
 
@@ -370,7 +350,7 @@ def _key(scene: World, medium: Walked, eye: Eye, seed: int) -> str:
     channels = range(medium.medium.channels)
     tints = np.stack([scene.tint(triangles, thirds, c) for c in channels])
     digest = hashlib.sha256()
-    for name in ("walk.py", "traced.py"):
+    for name in ("walk.py", "estimate.py", "traced.py"):
         digest.update(Path(__file__).with_name(name).read_bytes())
     own = (scene.everything.corners, scene.everything.middle, scene.radiance(towards), tints)
     for array in (*own, eye.position, eye.turn, eye.lens, eye.number):

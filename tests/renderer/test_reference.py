@@ -159,6 +159,8 @@ def test_noise_is_not_counted_as_error():
     rms, error = rms_error(off, halves)
     assert (np.abs(rms - 0.05) < 4 * error).all() and (error < 0.005).all()
     np.testing.assert_allclose(Halves(halves, halves, 1).noise, 0.3 / np.sqrt(2), rtol=0.02)
+    dark = np.zeros((2, 4, 3))  # of a lamp without green, say
+    np.testing.assert_array_equal(rms_error(dark[0], dark), np.zeros((2, 3)))
 
 
 class Interrupting:
@@ -177,12 +179,12 @@ class Interrupting:
 def test_a_run_taken_up_again_equals_one_that_was_not_interrupted(tmp_path, monkeypatch):
     monkeypatch.setenv("SUBDERMAL_CACHE", str(tmp_path))
     monkeypatch.setattr(estimates, "SAVE_EVERY_S", 0.0)
-    monkeypatch.setattr(estimates, "BLOCK", 1200)
+    monkeypatch.setattr(estimates, "BLOCK", 1000)  # two blocks a step
     _, solid = box()
-    made, at = walked(MATCHED), on_the_front(np.linspace(-1, 1, 300))
+    made, at = walked(MATCHED), on_the_front(np.linspace(-1, 1, 700))
     whole = estimate(solid, made, *at, constant, 24, 1, keep=False)
     with pytest.raises(KeyboardInterrupt):
-        estimate(solid, made, *at, Interrupting(6), 24, 1)
+        estimate(solid, made, *at, Interrupting(6), 24, 1)  # within the third step
     kept = list((tmp_path / "reference").glob("*.npz"))
     assert len(kept) == 1
     again = Interrupting(100)

@@ -7,6 +7,7 @@ import renderer
 from renderer.errors import InputError
 from renderer.optics import fresnel, media, montecarlo
 from renderer.optics.medium import Stack
+from renderer.reference import estimate as estimates
 from renderer.reference import traced
 from renderer.reference.estimate import walked
 from renderer.reference.walk import Part
@@ -99,6 +100,36 @@ def test_a_curve_is_walked_behind_a_dielectric_face_too():
     assert glassy.medium.eta == 1.4 and glassy.medium.sigma_a != matched.medium.sigma_a
     np.testing.assert_allclose(glassy.albedo, curve.albedo, atol=0.01)
     assert (glassy.residual < 0.03).all()
+
+
+def test_a_trace_taken_up_again_equals_one_that_was_not_interrupted(tmp_path, monkeypatch):
+    """Ended within a step, as by a kill: what was kept is whole steps, and the numbers are those of
+    a run from the first photon to the last."""
+    monkeypatch.setenv("SUBDERMAL_CACHE", str(tmp_path))
+    monkeypatch.setattr(estimates, "SAVE_EVERY_S", 0.0)
+    monkeypatch.setattr(traced, "BLOCK", 2000)
+    world, made = slab((0.0, 0.0, 1.0), radiance=0.1), walked(MATCHED)
+    eye = traced.Eye.of(CAMERA, np.ones((PIXELS, PIXELS), bool), 1000.0, world)
+    whole = traced.trace(world, made, eye, 10_000, 3, keep=False)
+    blocks, calls = traced._block, []
+
+    def block(*args):
+        calls.append(args)
+        if len(calls) == 15:
+            raise KeyboardInterrupt
+        return blocks(*args)
+
+    monkeypatch.setattr(traced, "_block", block)
+    with pytest.raises(KeyboardInterrupt):
+        traced.trace(world, made, eye, 10_000, 3)
+    assert len(list((tmp_path / "reference").glob("*.npz"))) == 1
+    taken_up = traced.trace(world, made, eye, 10_000, 3)
+    assert len(calls) == 15 + 3 * 6  # of five steps of two halves and three channels two were kept
+    np.testing.assert_array_equal(taken_up.values, whole.values)
+    traced.trace(world, made, eye, 10_000, 3)  # all of it is kept, but for another seed nothing is
+    assert len(calls) == 15 + 3 * 6
+    traced.trace(world, made, eye, 10_000, 4)
+    assert len(calls) == 15 + 3 * 6 + 5 * 6
 
 
 def test_bad_parameters():

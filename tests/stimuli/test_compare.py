@@ -109,6 +109,20 @@ def test_a_table_and_a_sheet(run, tmp_path):
         assert page.width == 3 * 48 + 2 * 4
 
 
+def test_a_colour_without_light_is_no_error(run, tmp_path):
+    """Nothing is nowhere wrong: errors of 0 and a ratio of 1, not nan."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    red = ("lights.sun.irradiance=[3,0,1]", "environment.ambient=[0,0,0]")
+    options = ("--size", "64x48", "--crop", "48x32+8+8", "--walks", 2, "--table", "table.csv")
+    patches = [part for value in red for part in ("--set", value)]
+    code, out, err = run("compare", "scene.toml", "-t", "none", *options, *patches)
+    assert code == 0, err
+    for row in csv.DictReader((tmp_path / "table.csv").open()):
+        assert [float(row[f"{name}_g"]) for name in ("rmse", "error", "ratio")] == [0, 0, 1]
+        assert float(row["rmse_r"]) > 0
+    assert "nan" not in out
+
+
 def test_six_gaussians_over_the_atlas_and_over_the_screen_are_one_picture(run, tmp_path):
     """On a flat slab under the shadows of bars: DSSIM below 0.002 (0.0007 at 480x270,
     docs/techniques.md), a hundredth of what leaving scattering out makes."""
