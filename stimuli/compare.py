@@ -80,8 +80,9 @@ class Row:
 class Shot:
     """A framing: images (H, W, 3) uint8 of the crop by technique, the truth's under the name
     `truth`, another one of half of its walks; noise (3,): standard error of its light, of a
-    computed pixel, in the unit of Row.rmse; residual (3,): see renderer.reference.estimate.Walked.
-    Where the truth is a technique, half is its image and noise and residual are 0.
+    computed pixel, in the unit of Row.rmse; residual (3,) and layered: see
+    renderer.reference.estimate.Walked. Where the truth is a technique, half is its image, and noise
+    and residual are 0.
     """
 
     framing: str
@@ -91,6 +92,7 @@ class Shot:
     rows: tuple[Row, ...]
     noise: np.ndarray
     residual: np.ndarray
+    layered: bool
 
 
 def chosen(specifications: Sequence[str]) -> dict[str, Any]:
@@ -177,7 +179,7 @@ def _shot(
     label, truth = next(iter((against or {"reference": make("reference", own)}).items()))
     inside = np.zeros((frame.height, frame.width), bool)
     inside[wide] = True
-    halves, scatters, regions, residual = _truth(frame, truth, lights, inside, options)
+    halves, scatters, regions, residual, layered = _truth(frame, truth, lights, inside, options)
     if not scatters.any():
         raise InputError(f"{framing}: nothing that scatters is seen in the crop; expected some")
     own = frame.surface.textures[0].read()[..., :3]
@@ -214,7 +216,7 @@ def _shot(
             numbers = [tuple(map(float, part)) for part in (rmse, error, ratio)]
             rows.append(Row(framing, name, region, int(mask.sum()), *numbers, measures))
     noise = np.sqrt(((halves[0] - halves[1])[scatters] ** 2).mean(axis=0)) / 2 / unit
-    return Shot(framing, label, images, half, tuple(rows), noise, residual)
+    return Shot(framing, label, images, half, tuple(rows), noise, residual, layered)
 
 
 def _ratio(light: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -241,7 +243,7 @@ def _crop(options: Options) -> tuple[int, int, int, int]:
 
 
 def _truth(frame, truth, lights, inside: np.ndarray, options: Options):
-    """halves (2, H, W, 3) of scattered light, where it is (H, W), regions, residual (3,)."""
+    """halves (2, H, W, 3) of scattered light, where it is (H, W), regions, residual (3,) and layered."""
     from renderer.reference import places
     from renderer.reference.walk import Solid
     from renderer.techniques.reference import medium_of, part_of, visible
@@ -252,20 +254,21 @@ def _truth(frame, truth, lights, inside: np.ndarray, options: Options):
     shape = inside.shape
     names = ("skin", "shadow edges", "back-lit")
     regions = {name: np.zeros(shape, bool) for name in names}
-    residual = np.zeros(3)
+    residual, layered = np.zeros(3), False
     walks = truth.domain == "walks"
     if not walks:
         albedo = np.maximum(frame.surface.textures[2].read()[..., :3], 1e-6)
         with frame.scatter(truth) as target:
             light = _bare(target, albedo, truth)
-    for medium in range(1, len(frame.renderer.media) + 1):
-        inputs = frame.inputs(False, medium=medium)
+    for number in range(1, len(frame.renderer.media) + 1):
+        inputs = frame.inputs(False, medium=number)
         where = (inputs.irradiance.read()[..., 3] > 0.5) & inside
         if not where.any():
             continue
         halves[:, where] = truth.halves(inputs, where).values if walks else light[where]
         if walks:
-            residual = np.maximum(residual, medium_of(inputs.room, options.index).residual)
+            medium = medium_of(inputs.room, options.index)
+            residual, layered = np.maximum(residual, medium.residual), layered or medium.layered
         solid = Solid([part_of(drawn) for drawn in inputs.room.surfaces])
         depths = inputs.depths.read()[..., 0]
         points, normals, seen = visible(solid, inputs.room.camera, depths, where)
@@ -278,7 +281,7 @@ def _truth(frame, truth, lights, inside: np.ndarray, options: Options):
         regions["back-lit"][where] = places.back_lit(
             everything, solid, lights, *at, options.thin_mm
         )
-    return halves, regions["skin"], regions, residual
+    return halves, regions["skin"], regions, residual, layered
 
 
 def pooled(values: np.ndarray, s: int) -> np.ndarray:

@@ -7,6 +7,10 @@ import click
 from app import drawing
 from app.commands.media import writable
 
+LAYERED = (
+    "; layers are walked as that one medium, which lets other light through thin parts than they do"
+)
+
 
 def _crop(_context, _parameter, value: str | None):
     from stimuli.compare import parse_crop
@@ -156,6 +160,7 @@ def command(
             f"{shot.framing}: reference of {options['walks']} walks"
             f"{' (denoised)' if options['pool_mm'] else ''}, standard error {noise} a "
             f"computed pixel; its medium stays {residual} from the curve (rms at an edge)"
+            f"{LAYERED if shot.layered else ''}"
         )
         _print([row.cells() for row in shot.rows])
     if table:

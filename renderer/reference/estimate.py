@@ -32,12 +32,14 @@ Light = Callable[[np.ndarray, np.ndarray], np.ndarray]
 class Walked:
     """The medium that is walked in. residual (C,): rms at a straight edge between it and the curve
     of the medium that was asked for, 0 where it is that one; albedo (C,): what a half-space of it
-    sends back of diffuse light that has entered.
+    sends back of diffuse light that has entered; layered: it stands for layers, which let other
+    light through thin parts (docs/techniques.md).
     """
 
     medium: Medium
     residual: np.ndarray
     albedo: np.ndarray
+    layered: bool = False
 
 
 def walked(description: str | dict, index: float = 0.0) -> Walked:
@@ -67,7 +69,8 @@ def _walked(description: str, index: float) -> Walked:
         albedo = chandrasekhar.diffuse_albedo(medium.albedo)
     else:
         albedo = np.asarray(target.albedo)
-    return Walked(medium, residual, albedo)
+    layered = isinstance(stack, Stack) and len(stack.layers) > 1
+    return Walked(medium, residual, albedo, layered)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from renderer.errors import InputError
 from renderer.optics import media
 from renderer.optics import transmittance as tr
 from renderer.optics.medium import SKIN_THREE_LAYERS, Medium, Stack
+from renderer.reference.estimate import walked
 
 
 def test_of_a_medium_that_only_absorbs_it_is_twice_the_third_exponential_integral():
@@ -43,6 +44,22 @@ def test_a_sheet_lets_as_much_through_wherever_it_is():
     table = {"layers": [{"medium": "skin1", "thickness_mm": 2.0}]}
     found = tr.curve_of(table)
     np.testing.assert_allclose(found.at([0.1, 100.0]), found.at([2.0, 2.0]))
+
+
+def test_layers_let_more_through_than_the_medium_nearest_to_their_curve():
+    """What the reference walks in in their place (docs/techniques.md): 3 mm send as much red and
+    three times the green and blue, since most of the absorption of that medium, which is spread
+    evenly, lies in the layers' thin upper part."""
+    layers, one = (
+        slabs.at([3.0])[0]
+        for slabs in (
+            tr.curve_of("skin_three_layers"),
+            tr.slabs(Stack.of(walked("skin_three_layers").medium), (0.517, 0.4995, 0.3762)),
+        )
+    )
+    assert layers[0] == pytest.approx(one[0], rel=0.15)
+    assert (layers[1:] > 2.5 * one[1:]).all() and (layers[1:] < 6 * one[1:]).all()
+    assert walked("skin_three_layers").layered and not walked("skin1").layered
 
 
 def test_formulas_are_what_their_papers_say():
