@@ -243,7 +243,7 @@ def _crop(options: Options) -> tuple[int, int, int, int]:
 
 
 def _truth(frame, truth, lights, inside: np.ndarray, options: Options):
-    """halves (2, H, W, 3) of scattered light, where it is (H, W), regions, residual (3,) and layered."""
+    """halves (2, H, W, 3) of scattered light, where it is (H, W), regions, residual, layered."""
     from renderer.reference import places
     from renderer.reference.walk import Solid
     from renderer.techniques.reference import medium_of, part_of, visible
