@@ -2,13 +2,14 @@
 # make demo SERVE=0   the same, but end instead of serving
 # make test           install what is missing, check the style, run every test
 # make test-bayes     install the sampler of `subdermal posterior` too, run its tests
+# make test-parquet   install pyarrow too, run the tests of responses.parquet
 # make test-postgres  install PostgreSQL and its driver, run the tests of the questionnaire over it
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
 # make translations   collect the messages of the pages into app/translations/*/*.po and compile them
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-bayes test-postgres demo bench translations clean
+.PHONY: help setup test test-bayes test-parquet test-postgres demo bench translations clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -35,6 +36,12 @@ test-bayes:
 	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
 		--require-hashes --only-binary :all: -r requirements-bayes.lock
 	.venv/bin/python -m pytest tests/posterior
+
+test-parquet:
+	@tools/setup test
+	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
+		--require-hashes --only-binary :all: -r requirements-parquet.lock
+	.venv/bin/python -m pytest tests/app/test_parquet.py tests/app/test_dashboard.py
 
 test-postgres:
 	@tools/setup test

@@ -22,7 +22,7 @@ from sqlalchemy.orm import Session, selectinload
 
 from analysis.files import replacing
 from analysis.manifest import KINDS
-from app import recruiting
+from app import parquet, recruiting
 from app.models import Link, Participant, Response, Trial
 from app.questionnaire import screen
 from app.study import Study
@@ -469,8 +469,16 @@ def _own(ask: Ask, when: str) -> Column:
         "integer" if ask.options else "text",
         values or "as it was written",
         f"Asked {when} the pairs: {ask.text} Empty where it was left out",
-        lambda r: next((s.value for s in r.participant.statements if s.name == ask.name), ""),
+        lambda r: _stated(r, ask),
     )
+
+
+def _stated(row: Row, ask: Ask) -> int | str | None:
+    """What was answered to a question of the study's own: a number where it has options."""
+    value = next((s.value for s in row.participant.statements if s.name == ask.name), "")
+    if not ask.options:
+        return value
+    return int(value) if value else None
 
 
 def counted(*columns: Any, who: ColumnElement[bool] | None = None) -> Select:
@@ -550,11 +558,22 @@ def responses_jsonl(session: Session, study: Study, *, simulated: bool) -> Itera
     yield "".join(lines)
 
 
+def responses_parquet(session: Session, study: Study, *, simulated: bool) -> Iterator[bytes]:
+    """responses.parquet: the same rows with the types of the codebook; needs pyarrow."""
+    about = {
+        "study": study.name,
+        "study_version": str(study.version),
+        "simulated": str(int(simulated)),
+        "rows": str(count(session)),
+    }
+    return parquet.parquet(columns(study), records(session, study, simulated=simulated), about)
+
+
 def write_zip(file: BinaryIO, session: Session, study: Study, *, simulated: bool) -> None:
     """All tables of one snapshot as a zip, with SHA256SUMS and the number of answers in
-    counts.json.
+    counts.json; responses.parquet where pyarrow is installed.
     """
-    parts = {
+    parts: dict[str, Iterable[str] | Iterable[bytes]] = {
         "responses.csv": responses_csv(session, study, simulated=simulated),
         "responses.jsonl": responses_jsonl(session, study, simulated=simulated),
         "codebook.csv": codebook_csv(study),
@@ -562,14 +581,17 @@ def write_zip(file: BinaryIO, session: Session, study: Study, *, simulated: bool
         "manifest.json": [(study.directory / MANIFEST).read_text("utf-8")],
         "counts.json": [json.dumps({"responses": count(session), "simulated": simulated}) + "\n"],
     }
+    if parquet.available():
+        parts["responses.parquet"] = responses_parquet(session, study, simulated=simulated)
     sums = []
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, texts in parts.items():
+        for name, pieces in parts.items():
             digest = hashlib.sha256()
             with archive.open(name, "w", force_zip64=True) as entry:
-                for text in texts:
-                    entry.write(text.encode())
-                    digest.update(text.encode())
+                for piece in pieces:
+                    data = piece.encode() if isinstance(piece, str) else piece
+                    entry.write(data)
+                    digest.update(data)
             sums.append(f"{digest.hexdigest()}  {name}\n")
         archive.writestr("SHA256SUMS", "".join(sums))
 

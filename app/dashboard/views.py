@@ -23,7 +23,7 @@ from flask import (
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from app import export, password, recruiting
+from app import export, parquet, password, recruiting
 from app.dashboard import live
 from app.models import LogEntry, Participant, plain_code
 from app.security import REPORT_POLICY
@@ -88,6 +88,7 @@ def index():
             condition.name: condition.label for condition in study().definition.techniques
         },
         has_report=study().report(simulated()).is_file(),
+        parquet_available=parquet.available(),
         **_numbers(),
     )
 
@@ -134,6 +135,22 @@ def responses_jsonl():
             body, "simulated_responses.jsonl" if simulated() else "responses.jsonl"
         )
         response.mimetype = "application/jsonl"
+        response.headers["X-Row-Count"] = str(export.count(db))
+        response.call_on_close(opened.pop_all().close)
+    return response
+
+
+@blueprint.get("/responses.parquet")
+def responses_parquet():
+    """The same table, with the types of the codebook, a group of rows at a time."""
+    if not parquet.available():
+        abort(404, parquet.MISSING)
+    with ExitStack() as opened:
+        db = opened.enter_context(database().read())
+        body = export.responses_parquet(db, study(), simulated=simulated())
+        name = "simulated_responses.parquet" if simulated() else "responses.parquet"
+        response = _download(body, name)
+        response.mimetype = "application/vnd.apache.parquet"
         response.headers["X-Row-Count"] = str(export.count(db))
         response.call_on_close(opened.pop_all().close)
     return response

@@ -69,7 +69,7 @@ def test_the_whole_of_it_in_its_order(app, person):
         rows = list(export.records(db, app.extensions["study"], simulated=False))
     assert len(rows) == 10
     for row in rows:
-        assert (row["age"], row["glasses"], row["remarks"]) == ("1", "2", "none")
+        assert (row["age"], row["glasses"], row["remarks"]) == (1, 2, "none")
         assert (row["answer"], row["reason_ticks"], row["reason_text"]) == (1, "2", "<b>ears</b>")
     book = export.codebook_md(app.extensions["study"], simulated=False)
     assert "| `age` | integer | 1: under 30, 2: 30 on |" in book and "- reason 2: ears glow" in book

@@ -42,6 +42,7 @@ CLOSED = [
         "responses.csv",
         "participants.csv",
         "responses.jsonl",
+        "responses.parquet",
         "export.zip",
         "participants",
         "participants/P0001",
