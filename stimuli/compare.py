@@ -143,16 +143,16 @@ def compare(
 def framed(
     scene: str | Path, table: dict, framings: Sequence[str], options
 ) -> Iterator[tuple[str, Any, list]]:
-    """Each framing ("": the scene's own camera) of a scene's table, its frame while it is open, and
-    the scene's lamps. options: its size, supersample and seed; InputError where nothing scatters.
+    """Each framing ("": the scene's own camera; FRAMING/ANGLE: from another side) of a scene's
+    table, its frame while it is open, and the scene's lamps. options: its size, supersample and
+    seed; InputError where nothing scatters.
     """
     import renderer
     from renderer.scene import graph as graphs
 
     scenes = {}
     for framing in framings:
-        level = {"camera": {"framing": framing}} if framing else {}
-        scenes[framing or "own camera"] = read_scene(merge(table, level))
+        scenes[framing or "own camera"] = read_scene(_at(table, framing))
     staged = stage(next(iter(scenes.values())), options.seed)
     lights = graphs.contents(staged.graph).lights
     with renderer.Renderer(
@@ -163,6 +163,16 @@ def framed(
         for name, definition in scenes.items():
             with drawing.frame(definition.camera, definition.picture) as frame:
                 yield name, frame, lights
+
+
+def _at(table: dict, framing: str) -> dict:
+    """A scene's table with the camera at FRAMING or FRAMING/ANGLE."""
+    name, _, angle = framing.partition("/")
+    level = {"framing": name} if name else {}
+    if not angle:
+        return merge(table, {"camera": level})
+    own = {k: v for k, v in table.get("camera", {}).items() if k != "yaw_deg"}
+    return {**table, "camera": {**own, **level, "angle": angle}}
 
 
 def _shot(

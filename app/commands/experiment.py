@@ -8,9 +8,23 @@ from app import drawing
 from app.commands.media import writable
 
 
+def _numbers(kind):
+    """A callback: numbers of a kind with commas between them, as a tuple."""
+
+    def read(_context, _parameter, value: str):
+        try:
+            return tuple(kind(part) for part in value.split(","))
+        except ValueError:
+            raise click.BadParameter(
+                f"got {value!r}; expected numbers with commas between them"
+            ) from None
+
+    return read
+
+
 @click.group("experiment", no_args_is_help=False)
 def command() -> None:
-    """Put a claim on trial: samples."""
+    """Put a claim on trial: samples, the thesis's chapter 4, motion, cost, visibility."""
 
 
 @command.command("samples")
@@ -79,22 +93,86 @@ def command() -> None:
     type=click.Path(dir_okay=False, path_type=Path),
     help="The CSV file for the table, which is printed in any case.",
 )
-def samples(scene, techniques, framings, converged, patches, table, **options) -> None:
+@click.option(
+    "--out",
+    "-o",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the whole of the thesis's chapter 4: records, samples.csv and figures.",
+)
+@click.option(
+    "--part",
+    "-p",
+    "parts",
+    multiple=True,
+    type=click.Choice(["ladder", "contrast", "sweep", "angles"]),
+    help="Of chapter 4: ladder, few samples against 30 (figures 4.4, 4.5); contrast (4.6); sweep, "
+    "threshold, base and extra samples; angles (4.7, table 4.1). Repeat for more; without it all.",
+)
+@click.option(
+    "--thresholds",
+    default="0.05,0.15,0.25,0.35,0.45",
+    show_default=True,
+    callback=_numbers(float),
+    help="Of contrast, from which a pixel takes its extra samples.",
+)
+@click.option(
+    "--bases",
+    default="6,9,12",
+    show_default=True,
+    callback=_numbers(int),
+    help="Samples that every pixel takes.",
+)
+@click.option(
+    "--extras",
+    default="5,10,20",
+    show_default=True,
+    callback=_numbers(int),
+    help="Samples beside them.",
+)
+def samples(
+    scene,
+    techniques,
+    framings,
+    converged,
+    patches,
+    table,
+    out,
+    parts,
+    thresholds,
+    bases,
+    extras,
+    **options,
+) -> None:
     """Say how many samples techniques take in SCENE and how far their pictures are from converged
     ones, over skin: a row as soon as it is measured.
 
     Under supersampling an output pixel has several computed pixels: 22 samples at 2x2 are 88.
     Differences are root mean squares of sRGB levels (of 255) before they are rounded; each is
     followed by its ratio to the first technique's.
+
+    With --out it measures what chapter 4 of the thesis says instead: few samples against 30 and
+    against the converged, over skin and over the whole image; the contrast that spends samples; a
+    grid of its parameters beside the techniques of -t; three framings from three sides. Tables, and
+    figures as the thesis has them and better ones, each with its CSV. A run that was ended goes on.
     """
     from analysis.objective import MAPS
-    from stimuli.experiment import CONVERGED, Options, chosen, write_table
-    from stimuli.experiment import samples as measured
+    from stimuli.experiment.samples import CONVERGED, Options, chosen, write_table
+    from stimuli.experiment.samples import samples as measured
 
     if table:
         writable(table, (".csv",))
     if converged == "all":
         raise click.BadParameter("got all; expected one technique", param_hint="--converged")
+    if out:
+        if table or options.pop("rotations"):
+            raise click.UsageError("--table and --rotations are not of --out; expected one of them")
+        grid = {"thresholds": thresholds, "bases": bases, "extras": extras}
+        beside = _explicit("techniques") and {"beside": techniques}
+        options |= {"converged": converged or CONVERGED} | grid | (beside or {})
+        _chapter(scene, patches, framings, parts, options, out)
+        return
+    if parts:
+        raise click.UsageError("--part is of --out DIR; expected both")
     (goal,) = chosen([converged or CONVERGED]).values()
     options = Options(**options)
     rows: list = []
@@ -124,3 +202,39 @@ def samples(scene, techniques, framings, converged, patches, table, **options) -
 
 def _ratio(value: float, other: float) -> str:
     return f"{value / other:.2f}" if other else " -  "
+
+
+def _explicit(name: str) -> bool:
+    """Whether an option was given, and is not its default."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source is not click.core.ParameterSource.DEFAULT
+
+
+def _chapter(scene, patches, framings, parts, options: dict, out: Path) -> None:
+    """The thesis's chapter 4 into a folder."""
+    from tqdm import tqdm
+
+    from analysis.objective import MAPS
+    from stimuli.experiment import chapter as chapters
+    from stimuli.experiment import figures
+
+    options = chapters.Options(**options)
+    chapters.checked(options)
+    listed = chapters.tasks(framings, parts or chapters.PARTS, options)
+    rows: list[dict] = []
+    made = chapters.run(scene, patches, listed, options, MAPS, out)
+    with tqdm(total=len(listed), unit="picture", disable=None) as bar:
+        for done, task, own in made:
+            rows += own
+            bar.set_description(f"{task.part} {task.framing} {task.technique}")
+            bar.update(done - bar.n)
+    chapters.write_csv(rows, out / "samples.csv")
+    files = list(figures.draw(out, listed, rows, options))
+    s = options.supersample
+    click.echo(
+        f"samples are those of a computed pixel; an output pixel has {s * s}: 22 are {22 * s * s}"
+    )
+    for line in chapters.lines_41(rows):
+        click.echo(line)
+    click.echo(f"{out / 'samples.csv'}: {len(rows)} rows of {len(listed)} pictures")
+    click.echo(f"{out / 'figures'}: {len(files)} files")

@@ -25,7 +25,7 @@ STYLES = {
 }
 
 
-def _pyplot():
+def pyplot():
     """matplotlib without a screen, letters kept as text, the same bytes each time."""
     import matplotlib
 
@@ -50,7 +50,7 @@ def _pyplot():
 
 def save(figure, path: Path) -> None:
     """Write .svg or .png without a date."""
-    plt = _pyplot()
+    plt = pyplot()
     metadata = (
         {"Date": None, "Creator": None} if path.suffix.lower() == ".svg" else {"Software": None}
     )
@@ -74,7 +74,7 @@ def shown_reach(profile: Profile, share: float = 0.97) -> float:
 
 def compare(profiles: list[Profile], r_max: float | None = None):
     """R_d(r) of all models, a panel a channel, and T_d(r) below for slabs."""
-    plt = _pyplot()
+    plt = pyplot()
     stack = profiles[0].stack
     reach = r_max or max(shown_reach(p) for p in profiles)
     r = np.linspace(reach / 600, reach, 600)
@@ -121,7 +121,7 @@ def compare(profiles: list[Profile], r_max: float | None = None):
 # ones make use.
 def dipole_of_marble(photons: int, seed: int):
     """Rohat fig. 4.4: the dipole's reflectance profile of marble."""
-    plt = _pyplot()
+    plt = pyplot()
     figure, axis = plt.subplots(figsize=(5, 3.4))
     r = np.linspace(0.01, 4, 500)
     R = models.make("dipole", preset("marble")).reflectance(r)
@@ -147,7 +147,7 @@ def multipole_of_marble(photons: int, seed: int):
 
     4.5: reflectance and transmittance profiles of marble 2, 10 and 20 mean free paths thick.
     """
-    plt = _pyplot()
+    plt = pyplot()
     figure, axes = plt.subplots(3, 2, figsize=(7.5, 7.5))
     for row, thickness in zip(axes, (2, 10, 20), strict=True):
         profile = _marble_slab(thickness)
@@ -172,7 +172,7 @@ def thin_marble(photons: int, seed: int):
     4.6: the multipole's transmittance profile where the slab is too thin for it, with the slab by
     quantized diffusion.
     """
-    plt = _pyplot()
+    plt = pyplot()
     figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.4))
     r = np.linspace(0.003, 1.5, 500)
     for axis, thickness in zip(axes, (1.15, 1.5), strict=True):
@@ -198,7 +198,7 @@ def thin_marble(photons: int, seed: int):
 
 def _burley(parametrisation: str, title: str, published: tuple[float, float]):
     def draw(photons: int, seed: int):
-        plt = _pyplot()
+        plt = pyplot()
         judged = burley_reference.judge(parametrisation, photons, seed)
         figure, (axis, errors) = plt.subplots(1, 2, figsize=(8.4, 3.4))
         axis.plot(
@@ -241,7 +241,7 @@ def guided_kernels(photons: int, seed: int):
 
     3.5: guided kernels of d'Eon and Luebke's red profile for several k, beside the profile.
     """
-    plt = _pyplot()
+    plt = pyplot()
     reach = 6.0
     profile = lambda r: gaussians.reflectance(r)[:, 0]
     kernels = [
@@ -279,7 +279,7 @@ def guided_kernels(photons: int, seed: int):
 
 def artist_profile(photons: int, seed: int):
     """Vuletic fig. 3.6: the artist's two Gaussians, near and far, per channel."""
-    plt = _pyplot()
+    plt = pyplot()
     x = np.linspace(-3, 3, 1201)
     near, far, w = (0.09, 0.07, 0.05), (1.0, 0.45, 0.25), (0.35, 0.45, 0.55)
     a = separable.artist(x, near, far, w)
@@ -303,7 +303,7 @@ def translucency(photons: int, seed: int):
     """
     from renderer.optics import burley, transmittance
 
-    plt = _pyplot()
+    plt = pyplot()
     s = np.linspace(0, 4, 400)
     exact, published = gaussians.transmittance(s), gaussians.transmittance(s, published=True)
     by_burley = burley.transmittance(s[:, None], burley.from_mean_radius(gaussians.mean_radius()))
@@ -333,7 +333,7 @@ def transmittance_of_media(photons: int, seed: int):
     """
     from renderer.optics import transmittance
 
-    plt = _pyplot()
+    plt = pyplot()
     shown = (("deon_luebke", 8.0), ("skin_three_layers", 8.0), ("marble", 20.0))
     figure, axes = plt.subplots(3, 3, figsize=(10.5, 9.0))
     for row, (medium, reach) in zip(axes, shown, strict=True):

@@ -12,6 +12,7 @@ import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -86,68 +87,85 @@ def samples(
     """A row for every technique at every framing, as soon as it is measured."""
     table = merge(load_table(scene), patch)
     for name, frame, lights in framed(scene, table, framings, options):
-        goal = _picture(frame, converged, _cached(table, name, converged, options))
-        regions = _regions(frame, lights, options)
+        goal = picture(frame, converged, cached(table, name, converged, options))
+        where = regions(frame, lights, options)
         for label, technique in techniques.items():
-            yield _row(name, label, frame, technique, goal, regions, options, distances)
+            yield _row(name, label, frame, technique, goal, where, options, distances)
 
 
-def _row(framing, label, frame, technique, goal, regions, options, distances) -> Row:
-    image, counts = _drawn(frame, technique)
-    skin = regions["skin"]
+def _row(framing, label, frame, technique, goal, where, options, distances) -> Row:
+    image, counts = drawn(frame, technique)
+    skin = where["skin"]
     bias = float("nan")
     if options.rotations and hasattr(technique, "frames"):
-        mean, _ = _drawn(frame, replace(technique, frames=options.rotations))
-        noise = _rms(image - mean, skin) ** 2 / max(options.rotations - 1, 1)
-        bias = float(np.sqrt(max(_rms(mean - goal, skin) ** 2 - noise, 0.0)))
+        mean, _ = drawn(frame, replace(technique, frames=options.rotations))
+        noise = rms(image - mean, skin) ** 2 / max(options.rotations - 1, 1)
+        bias = float(np.sqrt(max(rms(mean - goal, skin) ** 2 - noise, 0.0)))
     taken = float(counts[counts > 0].mean()) if (counts > 0).any() else 0.0
-    rounded = [np.rint(255 * picture).astype(np.float32) / 255 for picture in (goal, image)]
+    rounded = [eight_bit(one) for one in (goal, image)]
     return Row(
         framing,
         label,
         int(skin.sum()),
         taken,
         taken * options.supersample**2,
-        *(_rms(image - goal, regions[where]) for where in ("skin", "edges", "jumps")),
+        *(rms(image - goal, where[part]) for part in ("skin", "edges", "jumps")),
         bias,
         {name: float(distance(*rounded)[skin].mean()) for name, distance in distances.items()},
     )
 
 
-def _rms(difference: np.ndarray, where: np.ndarray) -> float:
+def eight_bit(image: np.ndarray) -> np.ndarray:
+    """A picture in [0, 1] as it is shown: rounded to levels of 255, float32."""
+    return np.rint(255 * image).astype(np.float32) / 255
+
+
+def rms(difference: np.ndarray, where: np.ndarray) -> float:
     """Root mean square over pixels and channels, in levels of 255; nan where there are none."""
     return 255 * float(np.sqrt((difference[where] ** 2).mean())) if where.any() else float("nan")
 
 
-def _drawn(frame, technique) -> tuple[np.ndarray, np.ndarray]:
+def drawn(frame, technique) -> tuple[np.ndarray, np.ndarray]:
     """The picture (H, W, 3) sRGB in [0, 1] before it is rounded, and samples a computed pixel."""
     with frame.scatter(technique) as target:
         light, counted = target.textures
         return frame.develop(light, technique, rounded=False), counted.read()[..., 0].copy()
 
 
-def _cached(table: dict, framing: str, technique, options: Options) -> Path | None:
+def drawn_from(table: dict, framing: str, technique, options) -> dict:
+    """All that a picture depends on: its scene, view, technique, size, seed and source code."""
+    return {
+        "scene": table,
+        "framing": framing,
+        "technique": [technique.name, technique.parameters()],
+        "drawn": [options.size, options.supersample, options.seed],
+        "sources": digest(type(technique).__module__),
+    }
+
+
+digest = lru_cache(maxsize=64)(sources.digest)  # of a module's own files: they do not change
+
+
+def key(asked: dict) -> str:
+    """A name for what was asked for: 32 hexadecimal digits."""
+    text = json.dumps(asked, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def cached(table: dict, framing: str, technique, options) -> Path | None:
     """Where the converged picture of this scene by this technique is kept."""
     from renderer.caches import folder
 
     if not options.keep:
         return None
-    asked = {
-        "scene": table,
-        "framing": framing,
-        "technique": [technique.name, technique.parameters()],
-        "drawn": [options.size, options.supersample, options.seed],
-        "sources": sources.digest(type(technique).__module__),
-    }
-    key = hashlib.sha256(json.dumps(asked, sort_keys=True, default=str).encode()).hexdigest()[:32]
-    return folder() / "converged" / f"{key}.npy"
+    return folder() / "converged" / f"{key(drawn_from(table, framing, technique, options))}.npy"
 
 
-def _picture(frame, technique, file: Path | None) -> np.ndarray:
+def picture(frame, technique, file: Path | None) -> np.ndarray:
     """The converged picture, drawn or as it was kept."""
     if file is not None and file.is_file():
         return np.load(file)
-    image, _ = _drawn(frame, technique)
+    image, _ = drawn(frame, technique)
     if file is not None:
         file.parent.mkdir(parents=True, exist_ok=True)
         with replacing(file) as part, part.open("wb") as stream:
@@ -155,7 +173,7 @@ def _picture(frame, technique, file: Path | None) -> np.ndarray:
     return image
 
 
-def _regions(frame, lights, options: Options) -> dict[str, np.ndarray]:
+def regions(frame, lights, options: Options) -> dict[str, np.ndarray]:
     """Output pixels (H, W): of skin, of its shadows' edges, of its jumps of depth."""
     from renderer.reference import places
     from renderer.reference.walk import Solid
