@@ -60,7 +60,8 @@ class Quality:
     `analysis.manifest.KINDS`).
 
     fastest_ms: quicker answers are flagged; a simple reaction to a light takes about 200 ms (Luce
-    1986, Response Times, ch. 2)
+    1986, Response Times, ch. 2). clocks_apart_ms: so much longer than by the server's clock a
+    browser's may say that an answer took; more is taken for the server's and marked
     """
 
     practice: int = 0
@@ -69,6 +70,7 @@ class Quality:
     bias: int = 0
     traps: tuple[Trap, ...] = ()
     fastest_ms: int = 200
+    clocks_apart_ms: int = 1000
 
     @property
     def questions(self) -> int:
@@ -135,9 +137,12 @@ def read_quality(
         if any({*vars(one).values()} == {*vars(trap).values()} for one in traps):
             raise InputError(f"{entry.source}: {entry.key}: the same pair a second time")
         traps.append(trap)
-    fastest_ms = table.number("fastest_ms", 0, 60_000, default=Quality.fastest_ms)
+    limits = {
+        name: table.number(name, 0, 60_000, default=getattr(Quality, name))
+        for name in ("fastest_ms", "clocks_apart_ms")
+    }
     table.end()
-    return Quality(traps=tuple(traps), fastest_ms=fastest_ms, **counts)
+    return Quality(traps=tuple(traps), **counts, **limits)
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,10 @@ from math import gcd
 
 import numpy as np
 
-from stimuli.asking import Quality
+from stimuli.asking import Quality, Trap
 
 #: What a stream of random words is for; the first is followed by the list's number.
-_QUALITY, _DEAL, _LIST = 0, 1, 2
+_QUALITY, _DEAL, _LIST, _TRAPS, _BIAS = 0, 1, 2, 3, 4
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,10 @@ def trials(
     number : of the list, from 1
     quality : a pair that is asked again was asked in the first half and comes in the second;
         traps and pairs of one image stand anywhere; practice comes first, of pairs that are drawn
-        from the list's. They are drawn after and leave the order of the others as it is.
+        from the list's. They are drawn after and leave the order of the others as it is. The better
+        image of a trap is on the left in one list of a couple and on the right in the other, of
+        half of a list's traps on the left, to one; images that stand against themselves are dealt
+        in turn.
     pairs : how many of the study's pairs the list has; 0: all
     """
     couple, mirrored = divmod(number - 1, 2)
@@ -67,7 +70,9 @@ def trials(
     main = [Trial(place, *one) for place, one in enumerate(sided, start=1)]
     if not quality or not quality.questions:
         return main
-    return _with_quality(main, cells, techniques, quality, _shares(seed, _QUALITY, number))
+    traps = _sided_traps(quality.traps, _shares(seed, _TRAPS, couple), mirrored)
+    images = _against_itself(cells, techniques, seed, (number - 1) * quality.bias, quality.bias)
+    return _with_quality(main, traps, images, quality, _shares(seed, _QUALITY, number))
 
 
 def _shares(*words: int) -> Callable[[], float]:
@@ -155,17 +160,39 @@ def _sided(
     return sided
 
 
+def _sided_traps(traps: Sequence[Trap], share: Callable[[], float], mirrored: int) -> list[Trial]:
+    """Every second one with its better image on the left, in a shuffled order; mirrored: 1 for the
+    other sides.
+    """
+    first = int(share() < 0.5) + mirrored
+    return [
+        Trial(0, one.cell, *((one.better, one.worse)[:: 1 if (k + first) % 2 else -1]), "trap")
+        for k, one in enumerate(_shuffled(traps, share))
+    ]
+
+
+def _against_itself(
+    cells: Sequence[str], techniques: Sequence[str], seed: int, first: int, count: int
+) -> list[Trial]:
+    """So many pairs of one image on both sides, from `first` on in a sequence of all images that is
+    shuffled anew when it ends.
+    """
+    every = [(cell, name) for cell in cells for name in techniques]
+    trials = []
+    for k in range(first, first + count):
+        deal, place = divmod(k, len(every))
+        cell, name = _shuffled(every, _shares(seed, _BIAS, deal))[place]
+        trials.append(Trial(0, cell, name, name, "bias"))
+    return trials
+
+
 def _with_quality(
     main: list[Trial],
-    cells: Sequence[str],
-    techniques: Sequence[str],
+    traps: list[Trial],
+    images: list[Trial],
     quality: Quality,
     share: Callable[[], float],
 ) -> list[Trial]:
-    def sided(cell: str, one: str, other: str, kind: str) -> Trial:
-        left, right = (one, other) if share() < 0.5 else (other, one)
-        return Trial(0, cell, left, right, kind)
-
     placed = [(float(trial.order), trial) for trial in main]
     half = len(main) / 2
     again = _shuffled(main[: len(main) // 2], share)[: quality.repeats + quality.swapped]
@@ -175,12 +202,8 @@ def _with_quality(
         else:
             copy = replace(trial, left=trial.right, right=trial.left, kind="swapped")
         placed.append((half + 1 + share() * half, copy))
-    for trap in quality.traps:
-        trial = sided(trap.cell, trap.better, trap.worse, "trap")
+    for trial in (*traps, *images):
         placed.append((1 + share() * len(main), trial))
-    for _ in range(quality.bias):
-        cell, one = cells[int(share() * len(cells))], techniques[int(share() * len(techniques))]
-        placed.append((1 + share() * len(main), Trial(0, cell, one, one, "bias")))
     for k, trial in enumerate(_shuffled(main, share)[: quality.practice]):
         placed.append((k / (1 + quality.practice), replace(trial, kind="practice")))
     placed.sort(key=lambda pair: pair[0])

@@ -28,9 +28,6 @@ from app.study import Study
 
 #: Of `recruiting.ALPHABET`: 48 bits.
 CODE_LENGTH = 10
-#: So much longer than by the server's clock a browser's may say that an answer took.
-CLOCKS_APART_MS = 1000
-
 
 EMPTY: Mapping[str, str] = MappingProxyType({})
 
@@ -309,7 +306,8 @@ def _answer(
     rt_ms, reported = given.rt_ms, None
     if rt_ms is None:
         rt_ms = by_server
-    elif bound and rt_ms > by_server + CLOCKS_APART_MS:  # longer than the question has been there
+    elif bound and rt_ms > by_server + study.definition.quality.clocks_apart_ms:
+        # longer than the question has been there
         rt_ms, reported = by_server, rt_ms
     row = {
         "participant_id": due.id,

@@ -7,6 +7,7 @@ import io
 import json
 import re
 import shutil
+import tomllib
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from sqlalchemy import select
 from app import create_app
 from app.models import Response, Trial
 from app.server import running
+from stimuli.study import THESIS
 
 FLAGS = [
     "--headless",
@@ -716,7 +718,7 @@ def test_a_phone_is_asked_in_chinese_and_the_language_can_be_changed(
         context.set_offline(False)
         expect(page.locator("h1")).to_have_text(re.compile("问题 2"))
         page.wait_for_selector("main.shown fieldset:enabled")
-        page.click("summary:text('简体中文')")
+        page.click(".languages-of-question > summary")
         assert Axe().run(page, options=RULES).response["violations"] == []
         page.click("button:text('English')")
         shown(page, 2)
@@ -797,3 +799,49 @@ def test_boosted_images_take_turns_with_the_reference_unless_that_is_stopped(
     assert (row.point, row.answer) == (-2, -1)
     assert row.boosted_ms == pytest.approx(row.rt_ms - row.away_ms, abs=2)
     assert 2 <= row.flips <= 2 * 5 * row.rt_ms / 1000 + 2
+
+
+@pytest.mark.parametrize("mode", ["triplet", "boosted"])
+def test_triplets_on_a_large_screen_a_phone_and_at_twice_the_zoom(
+    chromium, tmp_path, write_study, mode
+):
+    """Both images and their reference are wholly on the screen and equally large, the header takes
+    two rows at most in every language, and an answer can be given.
+    """
+    from axe_playwright_python.sync_playwright import Axe
+
+    viewer = {"modes": [mode], "reference": "golubev"}
+    words = tomllib.loads(THESIS.read_text("utf-8"))
+    texts = {key: words[key] for key in ("languages", "text", "question", "scale", "familiarity")}
+    study_dir = write_study(tmp_path / mode, size=(320, 180), viewer=viewer, **texts)
+    app = create_app(study_dir)
+    screens = [(1920, 1080, 1), (390, 844, 3), (640, 360, 2)]
+    with running(app) as address:
+        for width, height, ratio in screens:
+            screen = {"viewport": {"width": width, "height": height}, "device_scale_factor": ratio}
+            touch = {"is_mobile": True, "has_touch": True} if width < 500 else {}
+            with chromium.new_context(**screen, **touch, locale="en-GB") as context:
+                page = context.new_page()
+                begin(page, address)
+                boxes = [one.bounding_box() for one in page.locator(".pair canvas").all()]
+                assert len(boxes) == 3
+                assert len({(box["width"], box["height"]) for box in boxes}) == 1
+                for box in boxes:
+                    assert box["x"] >= 0 and box["x"] + box["width"] <= width
+                    assert box["y"] >= 0 and box["y"] + box["height"] <= height
+                violations = Axe().run(page, options=RULES).response["violations"]
+                assert [(one["id"], one["nodes"][0]["html"]) for one in violations] == []
+                for name in texts["languages"] if touch else []:
+                    page.click(".languages-of-question > summary")
+                    page.click(f".languages-of-question button[value={name}]")
+                    page.wait_for_selector("main.shown fieldset:enabled")
+                    header = page.locator(".question header").bounding_box()["height"]
+                    assert header < 80  # it took three rows and 122 px
+                    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+                page.locator("input[name=answer]").first.check()
+                page.locator(".confirm button").click()
+                page.wait_for_selector("main[data-trial].shown fieldset:enabled")
+                expect(page.locator("input[name=answer]:checked")).to_have_count(0)
+    rows = [row for _, row in stored(app)]
+    assert [row.view for row in rows] == [mode] * 3
+    assert [row.device_pixel_ratio for row in rows] == [ratio for *_, ratio in screens]

@@ -430,3 +430,11 @@ def click(app, cookie, form):
     browser.set_cookie("subdermal", cookie)
     reply = browser.post("/question", data=form, headers={"Accept": "application/json"})
     assert reply.status_code == 200 and reply.json["outcome"] in ("recorded", "repeated")
+
+
+def test_how_far_the_clocks_may_be_apart_is_the_studys(tmp_path, write_study):
+    quality = {"clocks_apart_ms": 60_000}
+    somebody = Person(create_app(write_study(tmp_path / "apart", quality=quality))).begin()
+    somebody.send("trial", answer=1, rt_ms=30_000, view="beside")
+    (row,) = somebody.rows
+    assert (row.rt_ms, row.timed_by, row.rt_reported_ms) == (30_000, "browser", None)

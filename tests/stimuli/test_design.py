@@ -178,5 +178,11 @@ def test_what_tells_how_well_people_look_leaves_the_order_of_the_others():
                 better = trial.left if sign == -1 else trial.right
                 assert better == {"near": "a", "far": "b"}[trial.cell]
     drawn = [t for p in range(1, 201) for t in trials(cells, items, 5, p, quality)]
-    lefts = Counter(t.left for t in drawn if t.kind == "trap" and t.cell == "near")
-    assert 70 < lefts["a"] < 130  # either side
+    for cell, better in (("near", "a"), ("far", "b")):
+        sides = Counter(t.left == better for t in drawn if t.kind == "trap" and t.cell == cell)
+        assert sides == {True: 100, False: 100}  # in each couple of lists once on each side
+    for p in range(1, 201):
+        better = [t.left in "ab" for t in trials(cells, items, 5, p, quality) if t.kind == "trap"]
+        assert sorted(better) == [False, True]  # of a list's two traps one on each side
+    images = Counter((t.cell, t.left) for t in drawn if t.kind == "bias")
+    assert len(images) == 8 and set(images.values()) == {50}  # each as often as the others
