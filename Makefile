@@ -2,6 +2,7 @@
 # make demo SERVE=0   the same, but end instead of serving
 # make test           install what is missing, check the style, run every test
 # make test-bayes     install the sampler of `subdermal posterior` too, run its tests
+# make test-cluster   install Dask's distributed too, run the tests of builds by several processes
 # make test-parquet   install pyarrow too, run the tests of responses.parquet
 # make test-postgres  install PostgreSQL and its driver, run the tests of the questionnaire over it
 # make setup          install what is missing, nothing else
@@ -9,7 +10,7 @@
 # make translations   collect the messages of the pages into app/translations/*/*.po and compile them
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-bayes test-parquet test-postgres demo bench translations clean
+.PHONY: help setup test test-bayes test-cluster test-parquet test-postgres demo bench translations clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -36,6 +37,12 @@ test-bayes:
 	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
 		--require-hashes --only-binary :all: -r requirements-bayes.lock
 	.venv/bin/python -m pytest tests/posterior
+
+test-cluster:
+	@tools/setup test
+	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
+		--require-hashes --only-binary :all: -r requirements-cluster.lock
+	.venv/bin/python -m pytest tests/cluster
 
 test-parquet:
 	@tools/setup test

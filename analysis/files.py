@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,13 +13,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+#: Names of files that are being written by `replacing`.
+PARTS = ".*.part"
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A path to write to, beside `path`; it takes its place when the block ends without an error.
 
-    Whatever ends the block, nothing else stays: what was at `path` before is there until then.
+    Whatever ends the block, nothing else stays: what was at `path` before is there until then. What
+    a process leaves that is killed meanwhile matches `PARTS`.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
     try:
         yield part
         os.replace(part, path)

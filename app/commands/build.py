@@ -5,6 +5,8 @@ from pathlib import Path
 
 import click
 
+from app import workers as working
+
 
 @click.command()
 @click.argument("study", type=click.Path(dir_okay=False, path_type=Path))
@@ -42,6 +44,7 @@ import click
         "manifest; 0: do not."
     ),
 )
+@working.options
 @click.option(
     "--force", is_flag=True, help="Render every image anew, also those that are up to date."
 )
@@ -52,6 +55,8 @@ def command(
     unit: str | None,
     up: str | None,
     rounds: int,
+    workers: int | None,
+    cluster: str | None,
     force: bool,
 ) -> None:
     """Render the images of the study defined in STUDY, a TOML file, and write their manifest.
@@ -66,7 +71,8 @@ def command(
     if head:
         scene = with_head(definition.scene, head, unit, up)
         definition = replace(definition, scene=scene)
-    built = build(definition, out, force=force, progress=True, rounds=rounds)
+    with working.crew(workers, cluster) as crew:
+        built = build(definition, out, force, True, rounds, crew.executor, crew.workers)
     for note in built.notes:
         click.echo(note, err=True)
     click.echo(

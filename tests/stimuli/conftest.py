@@ -182,7 +182,7 @@ def fake_renderer(monkeypatch):
     monkeypatch.setattr("renderer.renderer.driver", lambda: FakeRenderer("", (), 1, 0).info())
     monkeypatch.setattr("renderer.techniques.make", make)
     monkeypatch.setattr("stimuli.scenes.stage", stage)
-    monkeypatch.setattr("stimuli.build._source", lambda module: "source")
+    monkeypatch.setattr("stimuli.drawing._source", lambda module: "source")
     for name, value in (("driver", "fake"), ("stop_after", None)):
         monkeypatch.setattr(FakeRenderer, name, value)
     for name in ("drawn", "frames", "scenes"):

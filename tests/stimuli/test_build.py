@@ -7,12 +7,14 @@ import json
 import os
 import shutil
 import subprocess
+from concurrent.futures import Executor, Future
 
 import numpy as np
 import PIL.Image
 import pytest
 
 import stimuli.build
+import stimuli.drawing
 from stimuli.build import Built, build
 from stimuli.errors import InputError, Stopped
 from stimuli.manifest import load_manifest, sha256
@@ -86,18 +88,46 @@ def test_second_build_renders_nothing_and_changes_nothing(small_study, fake_rend
     assert contents(out) == before
 
 
+def as_one_file(out, version, **more):
+    """Puts the records of a folder into one file, as builds of before kept them."""
+    images = {}
+    for path in (out / "records").iterdir():
+        done = json.loads(path.read_text())
+        images[done.pop("file")] = {key: done[key] for key in done if key != "format"}
+    images |= dict.fromkeys(more.get("gone", ()), images[f"images/{IMAGES[0]}"])
+    if version == 1:
+        images = {file: {"key": one["key"], "image": one["image"]} for file, one in images.items()}
+    shutil.rmtree(out / "records")
+    record = {"format": f"subdermal-build/{version}", "images": images}
+    (out / "build.json").write_text(json.dumps(record))
+
+
 def test_a_folder_of_the_first_edition_is_built_anew(small_study, fake_renderer, out):
     """Its images are rendered under their names; one that the study no longer has is removed."""
     build(small_study, out)
     before = contents(out)
     shutil.copy(out / "images/near_plain.png", out / "images/gone_plain.png")
-    record = json.loads((out / "build.json").read_text())
-    record["format"] = "subdermal-build/1"
-    record["images"]["images/gone_plain.png"] = record["images"]["images/near_plain.png"]
-    for file, done in record["images"].items():
-        record["images"][file] = {"key": done["key"], "image": done["image"]}
-    (out / "build.json").write_text(json.dumps(record))
+    as_one_file(out, 1, gone=["images/gone_plain.png"])
     assert build(small_study, out) == built(4, 0)
+    assert contents(out) == before
+
+
+def test_a_folder_with_one_record_of_all_images_goes_on(small_study, fake_renderer, out):
+    """Nothing is rendered anew; the file becomes a record an image."""
+    build(small_study, out)
+    before = contents(out)
+    as_one_file(out, 2)
+    assert build(small_study, out) == built(0, 4)
+    assert contents(out) == before
+
+
+def test_what_a_killed_process_left_half_written_goes(small_study, fake_renderer, out):
+    build(small_study, out)
+    before = contents(out)
+    for half in ("images/.near_plain.png.1f.part", "records/.near_plain.json.1f.part"):
+        (out / half).write_bytes(b"half")
+    (out / "images" / IMAGES[3]).unlink()
+    assert build(small_study, out) == built(1, 3)
     assert contents(out) == before
 
 
@@ -133,7 +163,7 @@ def test_other_scene_or_source_renders_everything(small_study, fake_renderer, ou
     build(small_study, out)
     noon = dataclasses.replace(small_study, scene={**small_study.scene, "rig": "noon"})
     assert build(noon, out) == built(4, 0)
-    monkeypatch.setattr(stimuli.build, "_source", lambda module: "another")
+    monkeypatch.setattr(stimuli.drawing, "_source", lambda module: "another")
     assert build(noon, out) == built(4, 0)
 
 
@@ -202,6 +232,105 @@ def test_interrupted_build_goes_on(small_study, fake_renderer, out, tmp_path):
     assert contents(out) == contents(tmp_path / "whole")
 
 
+class Elsewhere(Executor):
+    """Does each task at once, as `before` leaves it, with nothing but the task."""
+
+    def __init__(self, before=lambda task: task):
+        self.before, self.tasks = before, []
+
+    def submit(self, fn, /, *args):
+        future = Future()
+        try:
+            args = [self.before(task) for task in args]
+            self.tasks += args
+            future.set_result(fn(*args))
+        except BaseException as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture
+def worker(monkeypatch):
+    """This process as a worker that has not drawn yet."""
+    monkeypatch.setattr(stimuli.drawing, "_studio", stimuli.drawing.Studio())
+    monkeypatch.setattr(stimuli.drawing, "_thread", None)
+
+
+def test_an_executor_makes_the_same_files(small_study, fake_renderer, worker, out, tmp_path):
+    """A task for each camera, and the scene is put up once."""
+    build(small_study, tmp_path / "here")
+    assert len(fake_renderer.scenes) == 1
+    elsewhere = Elsewhere()
+    assert build(small_study, out, executor=elsewhere, workers=2) == built(4, 0)
+    assert contents(out) == contents(tmp_path / "here")
+    assert [len(task.stimuli) for task in elsewhere.tasks] == [2, 2]
+    assert len(fake_renderer.scenes) == 2
+    assert build(small_study, out, executor=Elsewhere()) == built(0, 4)
+
+
+def test_a_task_that_is_done_again_draws_what_is_missing(
+    small_study, fake_renderer, worker, out, tmp_path
+):
+    """As where a worker was killed before it could say that it had finished."""
+    fake_renderer.stop_after = 3
+    lost = Elsewhere()
+    with pytest.raises(Stopped, match="stopped with 3 of 4 images rendered"):
+        build(small_study, out, executor=lost)
+    fake_renderer.stop_after = None
+    for task in lost.tasks:
+        stimuli.drawing.draw(task)
+    assert len(fake_renderer.drawn) == 4
+    assert build(small_study, out, executor=Elsewhere()) == built(0, 4)
+    build(small_study, tmp_path / "whole")
+    assert contents(out) == contents(tmp_path / "whole")
+
+
+def test_a_scene_is_one_task_where_there_are_many(write_toml, fake_renderer, worker, out):
+    skins = "".join(
+        f'\n[[factors.levels]]\nname = "s{k}"\nlabel = "S{k}"\n'
+        f"set = {{ materials = {{ head = {{ melanin = 0.{k} }} }} }}\n"
+        for k in range(1, 4)
+    )
+    text = write_toml().read_text() + '\n[[factors]]\nname = "skin"\nlabel = "Skin"\n' + skins
+    study, sizes = load_study(write_toml(text)), {}
+    for workers in (1, 2):
+        elsewhere = Elsewhere()
+        build(study, out, force=True, executor=elsewhere, workers=workers)
+        sizes[workers] = [len(task.stimuli) for task in elsewhere.tasks]
+    assert sizes == {1: [4] * 3, 2: [2] * 6}
+
+
+def test_a_worker_that_cannot_give_the_same_bytes_says_so(
+    small_study, fake_renderer, worker, out, monkeypatch
+):
+    def fails(message, before, **more):
+        with pytest.raises(InputError, match=message):
+            build(small_study, out, executor=Elsewhere(before), **more)
+        assert not (out / "manifest.json").exists()
+
+    with monkeypatch.context() as patch:
+        another = lambda module: "another"
+        other = lambda task: patch.setattr(stimuli.drawing, "_source", another) or task
+        fails("would make images/near_plain.png from other source or files", other)
+    with monkeypatch.context() as patch:
+        other = lambda task: patch.setattr(fake_renderer, "driver", "another") or task
+        fails("draws with 1, another; expected 1, fake", other)
+    elsewhere = lambda task: dataclasses.replace(task, out="/nowhere")
+    fails("does not see /nowhere; expected a folder on a file system of all workers", elsewhere)
+    monkeypatch.setattr(stimuli.drawing, "_thread", -1)  # another than this
+    fails("has several threads; expected one", lambda task: task)
+    with pytest.raises(InputError, match="times are asked for, 2 rounds, with workers"):
+        build(small_study, out, rounds=2, executor=Elsewhere())
+
+
+def test_images_that_workers_kept_for_themselves_are_missed(
+    small_study, fake_renderer, worker, out, monkeypatch
+):
+    monkeypatch.setattr(stimuli.drawing, "draw", lambda task: None)
+    with pytest.raises(InputError, match="workers drew 4 images that are not here, as images/near"):
+        build(small_study, out, executor=Elsewhere())
+
+
 def test_failing_disk_leaves_no_half_file(small_study, fake_renderer, out, monkeypatch):
     build(small_study, out)
     (out / "images" / IMAGES[0]).unlink()
@@ -239,11 +368,13 @@ def test_manifest_of_ready_made_images_is_not_overwritten(small_study, fake_rend
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}", '{"format": "subdermal-build/0", "images": {}}'])
-def test_foreign_record_is_refused(small_study, fake_renderer, out, text):
-    out.mkdir()
-    (out / "build.json").write_text(text)
-    with pytest.raises(InputError, match="build.json: not the record of a build"):
+@pytest.mark.parametrize("name", ["build.json", "records/near_plain.json"])
+def test_foreign_record_is_refused(small_study, fake_renderer, out, text, name):
+    (out / name).parent.mkdir(parents=True)
+    (out / name).write_text(text)
+    with pytest.raises(InputError, match=f"{name}: not the record of a build"):
         build(small_study, out)
+    assert contents(out) == {name: text.encode()}
 
 
 @pytest.mark.parametrize(
@@ -268,7 +399,7 @@ def test_renderer_that_returns_another_size_is_a_defect(small_study, fake_render
         small_study, render=dataclasses.replace(small_study.render, size=(40, 20))
     )
     with pytest.raises(RuntimeError, match=r"rendered \(18, 32, 3\)"):
-        stimuli.build._write_png(
+        stimuli.drawing.write_png(
             out,
             np.zeros((18, 32, 3), np.uint8),
             study.render.size,

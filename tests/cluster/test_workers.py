@@ -1,0 +1,120 @@
+"""Work that processes of this machine do: what one does, whatever becomes of them."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import wait
+from pathlib import Path
+
+import click
+import pytest
+
+from analysis.errors import InputError
+from app.workers import MOST_LOSSES, THREADS, crew
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Writes a file in each of two processes for ever; Ctrl-C ends it.
+ENDLESS = """
+import sys, time
+from pathlib import Path
+from analysis.files import replacing
+from app.workers import crew
+
+def write(name):
+    with replacing(Path(name)) as part:
+        part.write_text("half")
+        time.sleep(60)
+
+if __name__ == "__main__":
+    with crew(workers=2) as made:
+        list(made.executor.map(write, sys.argv[1:]))
+"""
+
+
+def threads(_):
+    return os.getpid(), [os.environ[name] for name in THREADS]
+
+
+def die_once(marker):
+    """Ends the process in the midst of the work, the first time."""
+    if not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return marker.name
+
+
+def die(_):
+    os._exit(1)
+
+
+def test_a_build_by_two_processes_is_that_of_one(run, study, here, contents, tmp_path):
+    code, out, err = run("build", study, "--out", tmp_path / "out", "--workers", 2)
+    assert (code, out) == (0, f"{tmp_path / 'out'}: 8 images, 8 rendered, 0 up to date\n"), err
+    assert "8/8" in err
+    assert contents(tmp_path / "out") == here
+
+
+def test_workers_share_the_cores_and_are_no_forks(monkeypatch):
+    for name in THREADS:
+        monkeypatch.delenv(name, raising=False)
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    with crew(workers=1) as made:
+        ((pid, shares),) = made.executor.map(threads, [0])
+    assert pid != os.getpid() and shares == [str(cores)] * len(THREADS)
+
+
+def test_what_a_killed_worker_was_at_is_done_by_another(tmp_path):
+    with crew(workers=2) as made:
+        work = [made.executor.submit(die_once, tmp_path / name) for name in "ab"]
+        assert [future.result(60) for future in work] == ["a", "b"]
+
+
+def test_work_that_ends_every_worker_is_given_up():
+    with pytest.raises(InputError, match=f"ended {MOST_LOSSES} times before any task"):
+        with crew(workers=1) as made:
+            made.executor.submit(die, 0).result(60)
+
+
+def test_cancelled_work_is_not_done(tmp_path):
+    with crew(workers=1) as made:
+        work = [made.executor.submit(time.sleep, 0.5) for _ in range(6)]
+        work[-1].cancel()
+        wait(work[:1])
+    assert work[-1].cancelled() and all(future.done() for future in work)
+
+
+@pytest.mark.parametrize("who", ["all", "parent killed"])
+def test_workers_end_when_they_are_to(tmp_path, who):
+    """By Ctrl-C, which the whole group gets; or with the process that started them."""
+    (tmp_path / "endless.py").write_text(ENDLESS)
+    command = [sys.executable, tmp_path / "endless.py", tmp_path / "a", tmp_path / "b"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, env=environment
+    )
+    deadline = time.monotonic() + 60
+    while len(list(tmp_path.glob(".*.part"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    if who == "all":
+        os.killpg(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=30)
+        assert err.count("KeyboardInterrupt") == 1 and "Process Spawn" not in err
+    else:
+        process.kill()
+        process.communicate(timeout=30)  # returns when no worker holds stderr open any more
+    while list(tmp_path.glob(".*.part")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["endless.py"]
+    with pytest.raises(ProcessLookupError):  # nobody of the group is left
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline:
+            os.killpg(process.pid, 0)
+            time.sleep(0.05)
+
+
+def test_one_kind_of_workers_is_asked_for():
+    with pytest.raises(click.UsageError, match="either --workers or --cluster"):
+        with crew(2, "tcp://here:8786"):
+            pass
