@@ -7,8 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flask import Flask
+
+if TYPE_CHECKING:
+    from app.researchers import Doorkeeper
 
 __all__ = ["create_app"]
 
@@ -21,6 +25,7 @@ def create_app(
     enrolments: int = 100,
     trusted_hosts: Sequence[str] = (),
     metrics_token: str | None = None,
+    doorkeeper: Doorkeeper | None = None,
 ) -> Flask:
     """Make the WSGI application of the study in `study_dir` (a folder with a manifest.json).
 
@@ -31,8 +36,9 @@ def create_app(
         ten times that from all together; 0 for no limit. Programs have none.
     trusted_hosts: names under which the server is asked; others are refused. Any where empty.
     metrics_token: who shows it may read /metrics; nobody without one.
+    doorkeeper: of the accounts of the server; by default those in the study's own database.
     """
-    from app import dashboard, language, monitoring, questionnaire, security, web
+    from app import dashboard, language, monitoring, questionnaire, researchers, security, web
     from app.database import Database
     from app.simulation import views as simulation
     from app.study import Study
@@ -54,13 +60,14 @@ def create_app(
     )
     # guesses, counted for this study in this process
     app.extensions["code_attempts"] = security.Limiter(attempts=10, window_s=300)
-    app.extensions["logins"] = security.Limiter(attempts=5, window_s=300)
+    app.extensions["doorkeeper"] = doorkeeper or researchers.Doorkeeper(database)
     app.config.update(HOSTS=tuple(trusted_hosts), METRICS_TOKEN=metrics_token)
     security.init(app)
     web.init(app)
     language.init(app)
     app.register_blueprint(monitoring.blueprint)
     app.register_blueprint(questionnaire.blueprint)
+    app.register_blueprint(researchers.blueprint)
     app.register_blueprint(dashboard.blueprint)
     if simulated:
         app.register_blueprint(simulation.blueprint)

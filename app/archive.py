@@ -2,8 +2,9 @@
 counts. It is a backup, and it imports elsewhere, from one kind of database into another.
 
 A zip: `archive.json` says what is in it, `study/` is the study's folder without what is made from
-it, `tables/NAME.jsonl` has a row of a table a line. It holds what the database holds: keys,
-completion codes, the password's hash. Who has it can open the study; responses.csv is for others.
+it, `tables/NAME.jsonl` has a row of a table a line. It holds what the database holds of the study:
+keys, completion codes. Who has it can be every participant; responses.csv is for others. Accounts
+are the server's, and in no archive.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from sqlalchemy import Connection, Table, func, insert, select, text
 from analysis.files import replacing
 from app.database import Database, connect, migrate
 from app.errors import InputError
-from app.models import Base, Live, UtcDateTime
+from app.models import OF_THE_SERVER, Base, Live, StudyRecord, UtcDateTime
 from app.study import Study
 from stimuli.manifest import NAME as MANIFEST
 
@@ -32,7 +33,11 @@ ABOUT = "archive.json"
 CHUNK_ROWS = 500
 #: Tables that every archive has.
 _OLDEST = {"study", "participants", "trials", "responses", "statements", "events", "log"}
-TABLES = tuple(table for table in Base.metadata.sorted_tables if table is not Live.__table__)
+TABLES = tuple(
+    table
+    for table in Base.metadata.sorted_tables
+    if table is not Live.__table__ and table not in OF_THE_SERVER
+)
 
 
 def write(path: Path, study: Study, database: Database) -> dict[str, int]:
@@ -168,6 +173,8 @@ def _load(connection: Connection, table: Table, file: BinaryIO) -> int:
     times = {column.name for column in table.columns if isinstance(column.type, UtcDateTime)}
     for line in file:
         row = json.loads(line)
+        if table is StudyRecord.__table__:
+            row.pop("password_hash", None)  # of an archive of before there were accounts
         if unknown := row.keys() - table.columns.keys():
             raise InputError(
                 f"the archive is of a later version of subdermal: {table.name} has {min(unknown)}"

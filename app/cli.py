@@ -15,6 +15,8 @@ VERBS = {
     "strip": "app.commands.strip",
     "power": "app.commands.power",
     "serve": "app.commands.serve",
+    "account": "app.commands.account",
+    "log": "app.commands.log",
     "links": "app.commands.links",
     "simulate": "app.commands.simulate",
     "archive": "app.commands.archive",

@@ -79,9 +79,6 @@ class StudyRecord(Base):
     seed: Mapped[int] = mapped_column(BigInteger)
     design: Mapped[str]  # JSON: the names of cells and techniques, in the order of the study
     secret_key: Mapped[str] = mapped_column(String(64))  # signs the cookies
-    password_hash: Mapped[str | None] = mapped_column(
-        String(255)
-    )  # scrypt; None: nobody can log in yet
     simulation_seed: Mapped[int | None] = mapped_column(BigInteger)
     # JSON: the words and images that participants see, once one has begun
     content: Mapped[str | None]
@@ -270,14 +267,69 @@ class Link(Base):
 
 
 class LogEntry(Base):
-    """What researchers did: states, quotas, exclusions. Only ever appended."""
+    """What researchers did with this study: states, quotas, exclusions, links, downloads. Only ever
+    appended, which the database itself sees to.
+    """
 
     __tablename__ = "log"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime] = mapped_column(default=now)
+    # the name of an account, or "command line"; None: of before there were accounts
+    who: Mapped[str | None] = mapped_column(String(64))
     action: Mapped[str] = mapped_column(String(40))
     detail: Mapped[str] = mapped_column(String(1000))
+
+
+class Account(Base):
+    """Somebody who may sign in to the dashboards of a server. Read in the database of its first
+    study alone, as are the two tables below.
+    """
+
+    __tablename__ = "accounts"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(64), unique=True)  # of app.accounts.NAME
+    role: Mapped[str] = mapped_column(String(6))  # of app.accounts.ROLES
+    password_hash: Mapped[str] = mapped_column(String(255))  # argon2id
+    made_at: Mapped[datetime] = mapped_column(default=now)
+
+    __table_args__ = (CheckConstraint("role IN ('owner', 'viewer')", name="role"),)
+
+
+class SignIn(Base):
+    """A browser in which somebody is signed in; the row goes when they sign out, when their
+    password changes, or when it is too old.
+    """
+
+    __tablename__ = "sign_ins"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    account_id: Mapped[int] = mapped_column(ForeignKey("accounts.id"), index=True)
+    token_sha256: Mapped[str] = mapped_column(String(64), unique=True)
+    at: Mapped[datetime] = mapped_column(default=now)
+
+
+class AccountEntry(Base):
+    """Who signed in or failed to, and what became of accounts. Only ever appended, which the
+    database itself sees to.
+    """
+
+    __tablename__ = "account_log"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    at: Mapped[datetime] = mapped_column(default=now)
+    who: Mapped[str] = mapped_column(String(64))
+    action: Mapped[str] = mapped_column(String(40))
+    detail: Mapped[str] = mapped_column(String(1000))
+
+
+Index(None, AccountEntry.who, AccountEntry.action)
+
+#: What belongs to the server and not to the study; it is in no archive.
+OF_THE_SERVER = (Account.__table__, SignIn.__table__, AccountEntry.__table__)
+#: Tables of which the database takes back nothing: triggers refuse every change of a row.
+APPENDED_ONLY = ("log", "account_log")
 
 
 class Live(Base):

@@ -24,7 +24,7 @@ LONGEST = 100
 ALPHABET = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 #: States of a study, with what they mean to participants.
 STATES = {
-    "draft": "nobody can begin, but who is logged in to the dashboard",
+    "draft": "nobody can begin, but owners who are signed in",
     "pilot": "everybody can try it; their answers are kept apart and do not count",
     "open": "everybody can begin, and answers count",
     "paused": "nobody can begin; who has begun goes on",
@@ -58,7 +58,7 @@ def record_of(session: Session, *, lock: bool = False) -> StudyRecord:
 
 
 def door(session: Session, record: StudyRecord, *, insider: bool) -> Door:
-    """Whether a newcomer may begin. insider: is logged in to the dashboard."""
+    """Whether a newcomer may begin. insider: is signed in as an owner."""
     if record.state == "draft":
         return Door.OPEN if insider else Door.DRAFT
     if record.state in ("paused", "closed"):
@@ -83,18 +83,18 @@ def admission(session: Session, study: Study, fields: Mapping[str, str]) -> Door
     return Door.AGAIN if who and session.scalar(query) else Door.OPEN
 
 
-def make_links(session: Session, count: int, label: str) -> list[str]:
+def make_links(session: Session, count: int, label: str, *, who: str) -> list[str]:
     """New single-use links, by their tokens."""
     tokens = ["".join(secrets.choice(ALPHABET) for _ in range(16)) for _ in range(count)]
     session.add_all(Link(token=token, label=label[:100]) for token in tokens)
-    note(session, "links", f"{count} made{': ' if label else ''}{label[:100]}")
+    note(session, "links", f"{count} made{': ' if label else ''}{label[:100]}", who=who)
     return tokens
 
 
-def set_links_only(session: Session, only: bool) -> None:
+def set_links_only(session: Session, only: bool, *, who: str) -> None:
     record = record_of(session, lock=True)
     if record.links_only != only:
-        note(session, "links", "needed to begin" if only else "not needed to begin")
+        note(session, "links", "needed to begin" if only else "not needed to begin", who=who)
         record.links_only = only
 
 
@@ -138,33 +138,34 @@ def counts():
     )
 
 
-def note(session: Session, action: str, detail: str) -> None:
-    """Append to the log."""
-    session.add(LogEntry(action=action, detail=detail[:1000]))
+def note(session: Session, action: str, detail: str, *, who: str) -> None:
+    """Append to the log; who: the name of an account, or `app.accounts.COMMAND`."""
+    session.add(LogEntry(who=who, action=action, detail=detail[:1000]))
 
 
-def set_state(session: Session, state: str) -> None:
+def set_state(session: Session, state: str, *, who: str) -> None:
     record = record_of(session, lock=True)
     if record.state != state:
-        note(session, "state", f"{record.state} to {state}")
+        note(session, "state", f"{record.state} to {state}", who=who)
         record.state = state
 
 
-def set_quota(session: Session, quota: int | None, minutes: int) -> None:
+def set_quota(session: Session, quota: int | None, minutes: int, *, who: str) -> None:
     record = record_of(session, lock=True)
-    note(session, "quota", f"{record.quota or 'none'} to {quota or 'none'}, {minutes} minutes")
+    detail = f"{record.quota or 'none'} to {quota or 'none'}, {minutes} minutes"
+    note(session, "quota", detail, who=who)
     record.quota, record.reservation_minutes = quota, minutes
 
 
-def exclude(session: Session, participant: Participant, reason: str) -> None:
+def exclude(session: Session, participant: Participant, reason: str, *, who: str) -> None:
     """Leave a participant's answers out of every export, tally and figure; nothing is lost."""
     if participant.excluded_at is None:
         participant.excluded_at, participant.excluded_because = now(), reason[:500]
-        note(session, "exclude", f"{participant.code}: {reason}")
+        note(session, "exclude", f"{participant.code}: {reason}", who=who)
 
 
-def restore(session: Session, participant: Participant, reason: str) -> None:
+def restore(session: Session, participant: Participant, reason: str, *, who: str) -> None:
     """Let them count again."""
     if participant.excluded_at is not None:
         participant.excluded_at = participant.excluded_because = None
-        note(session, "restore", f"{participant.code}: {reason}")
+        note(session, "restore", f"{participant.code}: {reason}", who=who)

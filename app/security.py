@@ -93,8 +93,6 @@ def init(app: Flask) -> None:
     app.config.update(
         SECRET_KEY=record.secret_key,
         STUDY_KIND=record.kind,
-        # the one in the database; `serve` gives a simulated study that of the real one
-        PASSWORD_HASH=None,
         SESSION_COOKIE_NAME="subdermal" if record.kind == "real" else f"subdermal_{record.kind}",
         SESSION_COOKIE_HTTPONLY=True,
         SESSION_COOKIE_SAMESITE="Lax",

@@ -4,6 +4,7 @@ friendly error pages.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NoReturn
 
 from flask import (
@@ -54,6 +55,13 @@ def database() -> Database:
 def simulated() -> bool:
     """Whether the running application holds simulated answers."""
     return current_app.config["STUDY_KIND"] == "simulated"
+
+
+def download(body: str | Iterable[str] | Iterable[bytes], name: str) -> Response:
+    """A table to be saved under a name."""
+    response = Response(body, mimetype="text/csv")
+    response.headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return response
 
 
 def wants_json() -> bool:

@@ -4,9 +4,11 @@ from pathlib import Path
 
 import click
 
+from app.opening import database_option, directory_argument, opened
+
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@directory_argument
 @click.option(
     "--out",
     required=True,
@@ -14,11 +16,7 @@ import click
     type=click.Path(dir_okay=False, path_type=Path),
     help="The archive, a zip that only its owner can read.",
 )
-@click.option(
-    "--database",
-    metavar="URL",
-    help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.",
-)
+@database_option
 def command(directory: Path, out: Path, database: str | None) -> None:
     """Write the study in DIR into one file: manifest, images, every row of its database.
 
@@ -26,11 +24,11 @@ def command(directory: Path, out: Path, database: str | None) -> None:
     it again, also over another kind of database. It holds keys and codes: keep it as safe as the
     database.
     """
-    from app import archive
-    from app.database import Database
-    from app.study import Study
+    from app import archive, recruiting
+    from app.accounts import COMMAND
 
-    study = Study.open(directory)
-    url = database or study.database_url(False)
-    rows = archive.write(out, study, Database.open(url, study, simulated=False))
+    study, answers = opened(directory, database)
+    rows = archive.write(out, study, answers)
+    with answers.write() as session:
+        recruiting.note(session, "archive", out.name, who=COMMAND)
     click.echo(f"{out}: {rows['participants']} participants, {rows['responses']} answers")

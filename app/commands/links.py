@@ -4,9 +4,11 @@ from pathlib import Path
 
 import click
 
+from app.opening import database_option, directory_argument, opened
+
 
 @click.command()
-@click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@directory_argument
 @click.option(
     "--count",
     default=0,
@@ -27,11 +29,7 @@ import click
     default=None,
     help="Whether from now on a link is needed to begin; unchanged when not given.",
 )
-@click.option(
-    "--database",
-    metavar="URL",
-    help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.",
-)
+@database_option
 def command(
     directory: Path,
     count: int,
@@ -46,15 +44,12 @@ def command(
     spends nothing. links.csv on the dashboard says which were used.
     """
     from app import recruiting
-    from app.database import Database
-    from app.study import Study
+    from app.accounts import COMMAND
 
-    study = Study.open(directory)
-    url = database or study.database_url(False)
-    opened = Database.open(url, study, simulated=False)
-    with opened.write() as session:
-        tokens = recruiting.make_links(session, count, label) if count else []
+    _, answers = opened(directory, database)
+    with answers.write() as session:
+        tokens = recruiting.make_links(session, count, label, who=COMMAND) if count else []
         if only is not None:
-            recruiting.set_links_only(session, only)
+            recruiting.set_links_only(session, only, who=COMMAND)
     for token in tokens:
         click.echo(f"{address.rstrip('/')}/?link={token}")

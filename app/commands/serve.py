@@ -85,11 +85,6 @@ def _read_config(ctx: click.Context, parameter: click.Parameter, value: Path | N
     help="These options in TOML, without dashes: port = 80. Those given here go before.",
 )
 @click.option(
-    "--reset-password",
-    is_flag=True,
-    help="Set a new dashboard password, show it once, and end every login.",
-)
-@click.option(
     "--trusted-proxy",
     metavar="ADDRESS",
     help=(
@@ -106,26 +101,26 @@ def command(
     enrolments: int,
     trusted_hosts: tuple[str, ...],
     metrics_token: str | None,
-    reset_password: bool,
     trusted_proxy: str | None,
 ) -> None:
     """Serve the questionnaire and the dashboard of the study in DIR (a folder with a
     manifest.json).
 
     Every option may also stand in the environment, --port as SUBDERMAL_SERVE_PORT, or in a file.
-    The dashboard's password is made at the first start and shown once. Simulated participants of
-    the same study, if there are any, are under /simulated/.
+    At the first start an account `owner` is made and its password shown once; `subdermal account`
+    makes others. Simulated participants of the same study, if there are any, are under /simulated/.
     """
     from werkzeug.middleware.dispatcher import DispatcherMiddleware
 
-    from app import create_app, password, server
+    from app import accounts, create_app, server
 
     settings = {"trusted_hosts": trusted_hosts, "metrics_token": metrics_token}
     app = create_app(directory, database, enrolments=enrolments, **settings)
     study, answers = app.extensions["study"], app.extensions["database"]
     application, simulated = app, (study.directory / "simulated.sqlite3").is_file()
     if simulated:
-        twin = create_app(directory, simulated=True, **settings)
+        doorkeeper = app.extensions["doorkeeper"]  # one sign-in is for both
+        twin = create_app(directory, simulated=True, doorkeeper=doorkeeper, **settings)
         application = DispatcherMiddleware(app, {"/simulated": twin})
     proxy = {}
     if trusted_proxy:
@@ -134,15 +129,8 @@ def command(
             "trusted_proxy_headers": {"x-forwarded-for", "x-forwarded-proto", "x-forwarded-host"},
         }
     sockets = server.listen(host, port)
-    shown = (
-        password.reset(answers)
-        if reset_password or answers.record().password_hash is None
-        else None
-    )
-    if simulated:
-        twin.config["PASSWORD_HASH"] = (
-            answers.record().password_hash
-        )  # one password opens both dashboards
+    with answers.write() as session:
+        shown = accounts.add_first(session)
 
     address = (
         f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{server.port_of(sockets)}"
@@ -150,7 +138,7 @@ def command(
     click.echo(f"questionnaire  {address}/")
     click.echo(f"dashboard      {address}/dashboard/")
     if shown:
-        click.echo(f"password       {shown}   (shown only now)")
+        click.echo(f"password       {shown}   (of the account {accounts.FIRST}; shown only now)")
     if study.report(False).is_file():
         click.echo(f"report         {address}/dashboard/report/")
     if simulated:

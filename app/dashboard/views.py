@@ -1,14 +1,14 @@
-"""The pages and downloads of the dashboard. Everything but the login needs the password."""
+"""The pages and downloads of the dashboard, for who is signed in; owners alone change something."""
 
 from __future__ import annotations
 
 import re
 from contextlib import ExitStack
+from datetime import datetime
 from tempfile import TemporaryFile
 
 from flask import (
     Blueprint,
-    Response,
     abort,
     current_app,
     flash,
@@ -23,52 +23,33 @@ from flask import (
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from app import export, parquet, password, recruiting
+from app import accounts, export, logs, parquet, recruiting, researchers
 from app.dashboard import live
 from app.models import LogEntry, Participant, plain_code
 from app.security import REPORT_POLICY
-from app.web import database, simulated, study, wants_json
+from app.web import database, download, simulated, study
 
 blueprint = Blueprint("dashboard", __name__, url_prefix="/dashboard")
 #: Of the log, on the page; log.csv has all.
 LATEST_ENTRIES = 10
 
 
+#: Entries of the log on a page of its own.
+ENTRIES = 200
+#: What a viewer may send: it changes nothing.
+LOOKING = ("dashboard.completion",)
+#: Pages that are for owners.
+FOR_OWNERS = ("dashboard.log", "dashboard.log_csv")
+
+
 @blueprint.before_request
-def _require_login():
-    if request.endpoint == "dashboard.login" or password.logged_in():
-        return None
-    if wants_json():
-        abort(401, "The login has ended. Log in again.")
-    return redirect(url_for(".login"), 303)
+def _guard():
+    looks = request.method in ("GET", "HEAD", "OPTIONS") or request.endpoint in LOOKING
+    return researchers.guard(owners=not looks or request.endpoint in FOR_OWNERS)
 
 
-@blueprint.route("/login", methods=["GET", "POST"])
-def login():
-    if request.method == "GET":
-        return (
-            redirect(url_for(".index"), 303)
-            if password.logged_in()
-            else render_template("dashboard/login.html")
-        )
-    # The right password always lets in, whoever has been guessing: its 79 bits need no lock
-    # against guesses, which are only told to stop.
-    if not password.log_in(request.form.get("password", "")):
-        if not current_app.extensions["logins"].allow(request.remote_addr):
-            abort(429, "Too many passwords were tried. Wait five minutes and try again.")
-        flash(
-            "This is not the password. It was shown when the server first started; "
-            "`subdermal serve --reset-password` sets a new one."
-        )
-        return render_template("dashboard/login.html"), 401
-    current_app.extensions["logins"].forget(request.remote_addr)
-    return redirect(url_for(".index"), 303)
-
-
-@blueprint.post("/logout")
-def logout():
-    password.log_out()
-    return redirect(url_for(".login"), 303)
+blueprint.after_request(researchers.log_download)
+blueprint.context_processor(researchers.of_page)
 
 
 @blueprint.get("/")
@@ -111,7 +92,7 @@ def responses_csv():
         db = opened.enter_context(database().read())  # one snapshot for the count and the rows
         rows = export.count(db)
         body = export.responses_csv(db, study(), simulated=simulated())
-        response = _download(body, "simulated_responses.csv" if simulated() else "responses.csv")
+        response = download(body, "simulated_responses.csv" if simulated() else "responses.csv")
         response.headers["X-Row-Count"] = str(rows)
         response.call_on_close(opened.pop_all().close)
     return response
@@ -122,7 +103,7 @@ def completions_csv():
     """Which completion codes are real: for paying, without a word of the answers."""
     with database().read() as db:
         body = "".join(export.completions_csv(db))
-    return _download(body, "completions.csv")
+    return download(body, "completions.csv")
 
 
 @blueprint.get("/responses.jsonl")
@@ -131,9 +112,7 @@ def responses_jsonl():
     with ExitStack() as opened:
         db = opened.enter_context(database().read())
         body = export.responses_jsonl(db, study(), simulated=simulated())
-        response = _download(
-            body, "simulated_responses.jsonl" if simulated() else "responses.jsonl"
-        )
+        response = download(body, "simulated_responses.jsonl" if simulated() else "responses.jsonl")
         response.mimetype = "application/jsonl"
         response.headers["X-Row-Count"] = str(export.count(db))
         response.call_on_close(opened.pop_all().close)
@@ -149,7 +128,7 @@ def responses_parquet():
         db = opened.enter_context(database().read())
         body = export.responses_parquet(db, study(), simulated=simulated())
         name = "simulated_responses.parquet" if simulated() else "responses.parquet"
-        response = _download(body, name)
+        response = download(body, name)
         response.mimetype = "application/vnd.apache.parquet"
         response.headers["X-Row-Count"] = str(export.count(db))
         response.call_on_close(opened.pop_all().close)
@@ -174,7 +153,7 @@ def participants_csv():
     with database().read() as db:
         people = live.participants(db, study(), live.responses(db, study()))
     body = "".join(export.table_csv(list(people[0]) if people else ["code"], people))
-    return _download(body, "participants.csv")
+    return download(body, "participants.csv")
 
 
 @blueprint.get("/participants")
@@ -210,7 +189,7 @@ def judge(code: str):
         with database().write() as db:
             someone = _someone(db, code)
             change = recruiting.restore if someone.excluded_at else recruiting.exclude
-            change(db, someone, reason)
+            change(db, someone, reason, who=_who())
     return redirect(url_for(".participant", code=code), 303)
 
 
@@ -229,7 +208,7 @@ def state():
     if chosen not in recruiting.STATES:
         abort(400, f"The state is one of {', '.join(recruiting.STATES)}.")
     with database().write() as db:
-        recruiting.set_state(db, chosen)
+        recruiting.set_state(db, chosen, who=_who())
     flash(f"The study is {chosen}: {recruiting.STATES[chosen]}.")
     return redirect(url_for(".index"), 303)
 
@@ -243,7 +222,8 @@ def quota():
         flash("A quota is a whole number from 1, or nothing; a place is kept for minutes from 1.")
     else:
         with database().write() as db:
-            recruiting.set_quota(db, int(wanted) if wanted else None, int(minutes))
+            number = int(wanted) if wanted else None
+            recruiting.set_quota(db, number, int(minutes), who=_who())
     return redirect(url_for(".index"), 303)
 
 
@@ -254,14 +234,15 @@ def links():
     only = request.form.get("only")
     if only in ("yes", "no"):
         with database().write() as db:
-            recruiting.set_links_only(db, only == "yes")
+            recruiting.set_links_only(db, only == "yes", who=_who())
         return redirect(url_for(".index"), 303)
     if not re.fullmatch(r"[1-9][0-9]{0,3}", count):
         flash("How many links is a whole number from 1 to 9999.")
         return redirect(url_for(".index"), 303)
     with database().write() as db:
-        recruiting.make_links(db, int(count), label)
-    flash(f"{count} links were made; links.csv has them: put each behind /?link=.")
+        recruiting.make_links(db, int(count), label, who=_who())
+    place = f"{request.script_root}/?link="
+    flash(f"{count} links were made; links.csv has them: put each behind {place}.")
     return redirect(url_for(".index"), 303)
 
 
@@ -270,19 +251,38 @@ def links_csv():
     """Single-use links and whether each was used; without a word of the answers."""
     with database().read() as db:
         body = "".join(export.links_csv(db))
-    return _download(body, "links.csv")
+    return download(body, "links.csv")
+
+
+@blueprint.get("/log")
+def log():
+    """Who did what, the latest first."""
+    try:
+        before = datetime.fromisoformat(request.args["before"]) if request.args else None
+    except (KeyError, ValueError):
+        abort(400, "Expected ?before=TIME, as in the links of this page.")
+    with database().read() as db, researchers.doorkeeper().database.read() as accounts_db:
+        entries = logs.latest(db, accounts_db, ENTRIES + 1, before)
+        people = accounts.everybody(accounts_db)
+    return render_template(
+        "dashboard/log.html",
+        entries=entries[:ENTRIES],
+        more=len(entries) > ENTRIES,
+        accounts=people if before is None else [],
+    )
 
 
 @blueprint.get("/log.csv")
 def log_csv():
-    """What was done here: states, quotas, exclusions with their reasons."""
-    with database().read() as db:
-        rows = [
-            {"at": entry.at.isoformat(timespec="seconds"), "action": entry.action}
-            | {"detail": entry.detail}
-            for entry in _entries(db)
-        ]
-    return _download("".join(export.table_csv(["at", "action", "detail"], rows)), "log.csv")
+    """All of it, the first first."""
+    with database().read() as db, researchers.doorkeeper().database.read() as accounts_db:
+        body = "".join(logs.csv(db, accounts_db))
+    return download(body, "log.csv")
+
+
+def _who() -> str:
+    """The name of who is signed in."""
+    return researchers.current().name
 
 
 def _entries(db: Session, *which) -> list[LogEntry]:
@@ -294,7 +294,7 @@ def recruits_csv():
     """Who came by a recruiter's link, to pay; without a word of the answers."""
     with database().read() as db:
         body = "".join(export.recruits_csv(db, study()))
-    return _download(body, "recruits.csv")
+    return download(body, "recruits.csv")
 
 
 @blueprint.get("/pilot_responses.csv")
@@ -302,7 +302,7 @@ def pilot_responses_csv():
     """The answers of who tried the study out, which are in no other table."""
     with database().read() as db:
         body = "".join(export.pilot_csv(db, study(), simulated=simulated()))
-    return _download(body, "pilot_responses.csv")
+    return download(body, "pilot_responses.csv")
 
 
 @blueprint.post("/completion")
@@ -320,12 +320,12 @@ def completion():
 
 @blueprint.get("/codebook.csv")
 def codebook_csv():
-    return _download(export.codebook_csv(study()), "codebook.csv")
+    return download(export.codebook_csv(study()), "codebook.csv")
 
 
 @blueprint.get("/codebook.md")
 def codebook_md():
-    response = _download(export.codebook_md(study(), simulated=simulated()), "codebook.md")
+    response = download(export.codebook_md(study(), simulated=simulated()), "codebook.md")
     response.mimetype = "text/markdown"
     return response
 
@@ -354,9 +354,3 @@ def report(name: str = "report.html"):
 def _numbers() -> dict:
     period_s = current_app.config.get("LIVE_PERIOD_S", live.PERIOD_S)
     return live.shared(database(), study(), period_s)
-
-
-def _download(body, name: str) -> Response:
-    response = Response(body, mimetype="text/csv")
-    response.headers["Content-Disposition"] = f'attachment; filename="{name}"'
-    return response

@@ -25,7 +25,7 @@ from flask_babel import gettext
 from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
-from app import language, password, recruiting
+from app import language, recruiting, researchers
 from app.models import Participant
 from app.questionnaire import flow, screen, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
@@ -79,7 +79,7 @@ def welcome():
             if token := request.args.get("link"):
                 session["link"] = token[:20]
             record = recruiting.record_of(db)
-            door = recruiting.door(db, record, insider=password.logged_in())
+            door = recruiting.door(db, record, insider=researchers.is_owner())
             if door is Door.OPEN:
                 door = recruiting.admission(db, study(), session.get("recruit", {}))
             if door is Door.OPEN:
@@ -123,7 +123,7 @@ def consent():
                 "try again."
             ),
         )
-    insider = password.logged_in()
+    insider = researchers.is_owner()
     with database().write() as db:
         participant = flow.enrol(
             db,

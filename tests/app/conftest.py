@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from argon2 import PasswordHasher
 from PIL import Image
 from sqlalchemy import create_engine, make_url, select, text
 
-from app import create_app
+from app import accounts, create_app
 from app.database import Database
 from app.models import Participant, Response
 from app.simulation.client import forms
@@ -102,9 +103,11 @@ def study_dir(tmp_path, write_study):
 
 
 @pytest.fixture
-def app(study_dir):
+def app(study_dir, monkeypatch):
     app = create_app(study_dir)
     app.config["LIVE_PERIOD_S"] = 0  # the dashboard's numbers are made anew at once
+    monkeypatch.setattr("app.researchers.PAUSE_S", 0)
+    monkeypatch.setattr(accounts, "HASHER", PasswordHasher(1, 8, 1))  # as fast as it gets
     return app
 
 
@@ -116,14 +119,29 @@ def person(app):
 
 @pytest.fixture
 def experimenter(app):
-    """A browser that is logged in to the dashboard."""
-    from app import password
+    """A browser in which an owner is signed in."""
+    return researcher(app, "owner")
 
-    visitor = Person(app)
-    visitor.get("/dashboard/login")
-    visitor.send("password", password=password.reset(app.extensions["database"]))
-    assert visitor.path == "/dashboard/"
-    return visitor
+
+@pytest.fixture
+def viewer(app):
+    """A browser in which a viewer is signed in."""
+    return researcher(app, "viewer")
+
+
+PASSWORD = "a password of the tests"
+
+
+def researcher(app, role):
+    """A person who is signed in with an account that is named as its role is."""
+    with app.extensions["doorkeeper"].database.write() as db:
+        if not accounts.find(db, role):
+            accounts.add(db, role, role, PASSWORD, who="the test")
+    somebody = Person(app)
+    somebody.get("/dashboard/login")
+    somebody.send("password", name=role, password=PASSWORD)
+    assert somebody.path == "/dashboard/"
+    return somebody
 
 
 class Person:

@@ -15,7 +15,7 @@ from PIL import Image
 from playwright.sync_api import expect, sync_playwright
 from sqlalchemy import select
 
-from app import create_app
+from app import accounts, create_app
 from app.models import Response, Trial
 from app.server import running
 from stimuli.study import THESIS
@@ -572,11 +572,12 @@ def edges(box, start, size, ratio):
 
 
 def test_the_dashboard_refreshes_by_itself(page, address, app):
-    from app import password
-
+    with app.extensions["database"].write() as db:
+        secret = accounts.add_first(db)
     page.goto(f"{address}dashboard/")
-    page.fill("[name=password]", password.reset(app.extensions["database"]))
-    page.click("button:has-text('Log in')")
+    page.fill("[name=name]", accounts.FIRST)
+    page.fill("[name=password]", secret)
+    page.click("button:has-text('Sign in')")
     expect(page.locator(".figures dd").first).to_have_text("0")
     with page.context.browser.new_context() as other:
         begin(other.new_page(), address)

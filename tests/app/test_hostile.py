@@ -134,21 +134,6 @@ def test_ids_and_keys_of_others_open_nothing(app, person):
         assert forged.path == "/"
 
 
-def test_logging_in_makes_no_session_of_anothers_cookie(app, person):
-    """Who planted a cookie before the login is not logged in by it."""
-    from app import password
-
-    secret = password.reset(app.extensions["database"])
-    victim, attacker = person(), person()
-    victim.get("/dashboard/login")
-    planted = victim.http.get_cookie("subdermal").value
-    victim.send("password", password=secret)
-    assert victim.path == "/dashboard/"
-    attacker.http.set_cookie("subdermal", planted)
-    attacker.get("/dashboard/")
-    assert attacker.path == "/dashboard/login"
-
-
 def test_no_cell_of_a_table_is_a_formula(app, person, experimenter):
     person().begin().answer(*[0] * 30)
     with app.extensions["database"].write() as db:

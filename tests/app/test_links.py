@@ -15,8 +15,8 @@ from app.recruiting import Door
 
 def make(app, count=1, *, only=True):
     with app.extensions["database"].write() as db:
-        recruiting.set_links_only(db, only)
-        return recruiting.make_links(db, count, "class 3")
+        recruiting.set_links_only(db, only, who="the test")
+        return recruiting.make_links(db, count, "class 3", who="the test")
 
 
 def states(experimenter):

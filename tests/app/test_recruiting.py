@@ -20,12 +20,12 @@ from app.security import Limiter
 
 def set_state(app, state):
     with app.extensions["database"].write() as db:
-        recruiting.set_state(db, state)
+        recruiting.set_state(db, state, who="the test")
 
 
 def set_quota(app, quota, minutes=120):
     with app.extensions["database"].write() as db:
-        recruiting.set_quota(db, quota, minutes)
+        recruiting.set_quota(db, quota, minutes, who="the test")
 
 
 def rows(response):
@@ -165,7 +165,7 @@ def test_places_of_who_stopped_expire_and_those_of_who_left_are_free(app, person
     with app.extensions["database"].write() as db:
         record = recruiting.record_of(db)
         assert recruiting.places(db, record) == 3
-        recruiting.exclude(db, db.get(Participant, 1), "asleep")
+        recruiting.exclude(db, db.get(Participant, 1), "asleep", who="the test")
         assert recruiting.places(db, record) == 2
         db.get(Participant, 2).pilot = True
         assert recruiting.door(db, record, insider=False) is Door.OPEN
@@ -188,9 +188,10 @@ def test_excluding_and_restoring_has_a_reason_and_deletes_nothing(app, person, e
     experimenter.send("reason", reason="it was a mistake")
     assert len(rows(experimenter.get("/dashboard/responses.csv"))) == 3
     log = rows(experimenter.get("/dashboard/log.csv"))
-    assert [(row["action"], row["detail"]) for row in log] == [
-        ("restore", "P0001: it was a mistake"),
-        ("exclude", "P0001: said that <b>they guessed</b>"),
+    done = [(row["who"], row["action"], row["detail"]) for row in log]
+    assert [one for one in done if one[1] in ("exclude", "restore")] == [
+        ("owner", "exclude", "P0001: said that <b>they guessed</b>"),
+        ("owner", "restore", "P0001: it was a mistake"),
     ]
     for _ in range(12):
         person().begin()

@@ -4,12 +4,11 @@ import re
 
 import pytest
 from flask import url_for
-from sqlalchemy import select
 from sqlalchemy.exc import OperationalError
 
-from app import create_app, password
-from app.models import StudyRecord
+from app import create_app
 from app.security import Limiter
+from tests.app.conftest import researcher
 
 FRAMINGS = ("close-up", "head-shot", "half-length")
 TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
@@ -48,7 +47,9 @@ CLOSED = [
         "participants/P0001",
         "pilot_responses.csv",
         "recruits.csv",
+        "log",
         "log.csv",
+        "links.csv",
         "completions.csv",
         "codebook.csv",
         "codebook.md",
@@ -72,7 +73,6 @@ OPEN = [
     "/study.css",
     "/health",
     "/metrics",
-    "/dashboard/links.csv",
     "/dashboard/login",
     "/simulation/",
     "/simulation/status.json",
@@ -139,16 +139,7 @@ def test_the_dashboard_is_closed_to_strangers(app, path):
 def test_headers_on_every_page(twin, logged_in):
     http = twin.test_client()
     if logged_in:
-        secret = password.reset(twin.extensions["database"])
-        token = re.search(r'name="csrf_token" value="([^"]+)"', http.get("/dashboard/login").text)[
-            1
-        ]
-        assert (
-            http.post(
-                "/dashboard/login", data={"csrf_token": token, "password": secret}
-            ).status_code
-            == 303
-        )
+        http = researcher(twin, "owner").http
     for path in [*addresses(twin, "GET"), "/nowhere", "/images/" + "0" * 64]:
         response = http.get(path)
         assert response.status_code in (200, 303, 404), path
@@ -224,8 +215,7 @@ def test_hostile_labels_are_escaped(tmp_path, write_study, request):
         somebody.send("familiarity", familiarity=1).text,
         somebody.answer(1).page.text,
     ]
-    somebody.get("/dashboard/login")
-    somebody.send("password", password=password.reset(app.extensions["database"]))
+    somebody = researcher(app, "owner")
     pages += [somebody.page.text, somebody.get("/dashboard/live.json").json["html"]]
     assert any("&lt;script&gt;" in page for page in pages)
     for page in pages:
@@ -238,40 +228,6 @@ def test_hostile_input_comes_back_escaped(person):
     assert "<b>x" not in somebody.send("code", code="<b>x", confirm="yes").text
     assert "<b>x" not in somebody.get("/resume/<b>x").text
     assert "<b>x" not in somebody.get("/<b>x").text
-
-
-def test_the_password_is_kept_only_as_a_hash(app):
-    database = app.extensions["database"]
-    secret = password.reset(database)
-    assert re.fullmatch(r"([a-z2-9]{4}-){3}[a-z2-9]{4}", secret)
-    with database.read() as db:
-        record = db.scalar(select(StudyRecord))
-    assert record.password_hash.startswith("scrypt:") and secret not in str(vars(record))
-
-
-def test_without_a_password_nobody_gets_in(person):
-    somebody = person()
-    somebody.get("/dashboard/login")
-    assert somebody.send("password", password="").status_code == 401
-    assert somebody.send("password", password="None").status_code == 401
-
-
-def test_wrong_passwords_are_slowed_down_and_a_new_one_ends_every_login(person, experimenter, app):
-    assert experimenter.get("/dashboard/").status_code == 200
-    secret = password.reset(app.extensions["database"])
-    experimenter.get("/dashboard/")
-    assert experimenter.path == "/dashboard/login"
-
-    app.extensions["logins"] = Limiter(attempts=5, window_s=300)
-    somebody = person()
-    somebody.get("/dashboard/login")
-    codes = [somebody.send("password", password="wrong").status_code for _ in range(5)]
-    form = somebody.form("password")
-    assert codes == [401] * 5
-    wrong = somebody.http.post("/dashboard/login", data=form | {"password": "wrong"})
-    assert wrong.status_code == 429
-    right = somebody.http.post("/dashboard/login", data=form | {"password": secret})
-    assert right.status_code == 303  # guesses lock nobody out
 
 
 @pytest.mark.parametrize("path", ["/dashboard", "/dashboard/report", "/question", "/dashboard/"])
@@ -327,13 +283,6 @@ def test_health_and_metrics_say_no_more_than_they_should(study_dir, person, app,
     monkeypatch.setattr("app.database.Database.read", gone)
     failed = app.test_client().get("/health")
     assert (failed.status_code, failed.json) == (503, {"status": "no database"})
-
-
-def test_logging_out(experimenter):
-    experimenter.get("/dashboard/")
-    experimenter.send("csrf_token")
-    experimenter.get("/dashboard/")
-    assert experimenter.path == "/dashboard/login"
 
 
 @pytest.mark.sqlite
