@@ -571,13 +571,18 @@ def edges(box, start, size, ratio):
     return [round(edge) for edge in found]
 
 
-def test_the_dashboard_refreshes_by_itself(page, address, app):
+def sign_in(page, address, app):
+    """Open the dashboard with the account of the first start."""
     with app.extensions["database"].write() as db:
         secret = accounts.add_first(db)
     page.goto(f"{address}dashboard/")
     page.fill("[name=name]", accounts.FIRST)
     page.fill("[name=password]", secret)
     page.click("button:has-text('Sign in')")
+
+
+def test_the_dashboard_refreshes_by_itself(page, address, app):
+    sign_in(page, address, app)
     expect(page.locator(".figures dd").first).to_have_text("0")
     with page.context.browser.new_context() as other:
         begin(other.new_page(), address)
@@ -590,14 +595,10 @@ def test_the_dashboard_folds_on_a_phone_and_axe_finds_nothing(
 ):
     from axe_playwright_python.sync_playwright import Axe
 
-    from app import password
-
     for k in range(3):
         person().begin().answer(*[(i * (k + 2)) % 5 - 2 for i in range(30)])
     page.set_viewport_size({"width": width, "height": 720})
-    page.goto(f"{address}dashboard/")
-    page.fill("[name=password]", password.reset(app.extensions["database"]))
-    page.click("button:has-text('Log in')")
+    sign_in(page, address, app)
     expect(page.locator("#fold-results .results").first).to_be_visible()
     size = page.evaluate("[document.body.scrollHeight, document.documentElement.scrollWidth]")
     assert size[0] < longest and size[1] == width  # tables scroll within the page
