@@ -386,6 +386,13 @@ COLUMNS = (
             ("display_gamma", "number", "", "By a grey matched to fine stripes; sRGB is about 2.2"),
             ("dark_steps_seen", "number", "0 to 4", "Squares 4, 8, 12, 16 levels above black"),
             ("bright_steps_seen", "number", "0 to 4", "Squares 4, 8, 12, 16 levels below white"),
+            ("plates_read", "integer", "from 0", "Colour plates whose digit was read"),
+            (
+                "plates_given",
+                "text",
+                "digits, with ; between them",
+                "What was read of each colour plate, nothing where none was given",
+            ),
         )
     ),
     Column(

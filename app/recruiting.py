@@ -45,6 +45,10 @@ class Door(Enum):
         "code that it gave you."
     )
     STRANGER = message("Please come by the link that you were given: it says who is to be paid.")
+    COLOURS = message(
+        "Thank you. This study is about small differences of colour, and goes on with people who "
+        "read most of the plates. Other people read fewer; it says nothing more about you."
+    )
     UNINVITED = message("Please come by the link that you were given.")
     SPENT = message(
         "This link was used already: it is for one person. Go on in the browser in which you began."

@@ -170,6 +170,8 @@ class Study:
             parts.append(text % {"num": own})
         if definition.screen.check:
             parts.append(words.gettext("the size of your screen's pixels, its greys and the zoom"))
+        if definition.screen.plates:
+            parts.append(words.gettext("which colour plates you read"))
         if definition.reason.share:
             parts.append(words.gettext("the reasons that you give for a choice"))
         if names := ", ".join(definition.recruiting.parameters):

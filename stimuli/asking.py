@@ -311,6 +311,8 @@ class Screen:
     card        measure the size of a pixel by a card (ISO/IEC 7810 ID-1)
     gamma       match a grey to fine stripes, and count the darkest and brightest steps
     distance_cm at which people are asked to sit; degrees of visual angle follow from it
+    plates      so many plates of dots that tell who sees colours as most do, 0 to 12; 0: none
+    plates_read who reads fewer of them is thanked and asked no further; 0: nobody is
     """
 
     check: bool = False
@@ -319,6 +321,8 @@ class Screen:
     card: bool = True
     gamma: bool = True
     distance_cm: int = 60
+    plates: int = 0
+    plates_read: int = 0
 
     def record(self) -> dict:
         return {**vars(self), "least_px": list(self.least_px)}
@@ -338,6 +342,8 @@ def read_screen(table: Table) -> Screen:
         table.take("card", default=True, **truth),
         table.take("gamma", default=True, **truth),
         table.number("distance_cm", 10, 1000, default=60),
+        plates := table.number("plates", 0, 12, default=0),
+        table.number("plates_read", 0, plates, default=0),
     )
     table.end()
     return screen

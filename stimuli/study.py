@@ -93,6 +93,8 @@ RESERVED = frozenset(
         "display_gamma",
         "dark_steps_seen",
         "bright_steps_seen",
+        "plates_read",
+        "plates_given",
         "point",
         "reason_ticks",
         "reason_text",

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from typing import Any
+
+from app import plates
 
 #: Width of a card of ISO/IEC 7810 ID-1, mm.
 CARD_MM = 85.60
@@ -42,7 +45,21 @@ def large_enough(measures: dict[str, float], least_px: tuple[int, int]) -> bool:
     return all(math.ceil(side * ratio) >= least for side, least in zip(sides, least_px))
 
 
-def columns(kept: str | None, distance_cm: int) -> dict[str, float | None]:
+def read_plates(form: dict[str, str], count: int, seed: int) -> dict[str, str | int]:
+    """What was given for each plate of a study, and how many were read as they are."""
+    if not count:
+        return {}
+    given = [form.get(f"plate_{k}", "").strip()[:1] for k in range(1, count + 1)]
+    given = [one if one in "0123456789" else "" for one in given]
+    return {"plates": ";".join(given), "plates_read": plates.read(given, seed)}
+
+
+def reads_enough(kept: str | None, least: int) -> bool:
+    """Whether somebody read as many plates as the study asks for."""
+    return not least or not kept or json.loads(kept).get("plates_read", 0) >= least
+
+
+def columns(kept: str | None, distance_cm: int) -> dict[str, Any]:
     """What responses.csv says of a screen; None where it was not measured.
 
     A grey that looks like fine stripes of black and white sends half of white's light:
@@ -59,4 +76,6 @@ def columns(kept: str | None, distance_cm: int) -> dict[str, float | None]:
         "display_gamma": grey and round(math.log(0.5) / math.log(grey / 255), 3),
         "dark_steps_seen": measures.get("dark_steps"),
         "bright_steps_seen": measures.get("bright_steps"),
+        "plates_read": measures.get("plates_read"),
+        "plates_given": measures.get("plates"),
     }

@@ -25,7 +25,7 @@ from flask_babel import gettext
 from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
-from app import language, recruiting, researchers
+from app import language, plates, recruiting, researchers
 from app.models import Participant
 from app.questionnaire import flow, screen, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
@@ -97,7 +97,7 @@ def welcome():
                 ][: 2 * PRELOADED_QUESTIONS],
             )
         place = _place(participant)
-        if place in ("questionnaire.thanks", "questionnaire.withdrawn", "questionnaire.closed"):
+        if place in _ENDS:
             return redirect(url_for(place))
         return render_template("questionnaire/back.html", place=place, participant=participant)
 
@@ -214,6 +214,23 @@ def look_at_screen():
         )
 
 
+@blueprint.get("/plate/<int:number>.png")
+def plate(number: int):
+    """A colour plate; its address says nothing of what can be read."""
+    wanted = study().definition.screen
+    if not 1 <= number <= wanted.plates:
+        abort(404, gettext("This study has no such image."))
+    data = plates.picture(study().seed, wanted.plates, number)
+    return current_app.response_class(data, mimetype="image/png")
+
+
+@blueprint.get("/not-taken")
+def not_taken():
+    """For who read fewer colour plates than the study asks for."""
+    with database().read() as db:
+        return _redirect_to_due(_participant(db)) or _closed(Door.COLOURS)
+
+
 @blueprint.post("/screen")
 def keep_screen():
     wanted, measures = study().definition.screen, screen.read(request.form)
@@ -222,9 +239,16 @@ def keep_screen():
         return render_template(
             "questionnaire/screen.html", small=True, measured=screen.MEASURED, upcoming=[]
         )
-    return _record(
-        "look_at_screen", lambda _, participant: flow.measure(participant, json.dumps(measures))
-    )
+    measures |= screen.read_plates(request.form, wanted.plates, study().seed)
+    kept = json.dumps(measures)
+
+    def keep(db: Session, participant: Participant) -> None:
+        flow.measure(participant, kept)
+        if not screen.reads_enough(kept, wanted.plates_read):
+            read = f"read {measures['plates_read']} of {wanted.plates} colour plates"
+            recruiting.exclude(db, participant, f"{read}, {wanted.plates_read} are needed")
+
+    return _record("look_at_screen", keep)
 
 
 @blueprint.get("/after")
@@ -458,6 +482,8 @@ def another():
     return redirect(url_for(".welcome"), 303)
 
 
+#: Pages after which nothing is asked.
+_ENDS = tuple(f"questionnaire.{page}" for page in ("thanks", "withdrawn", "closed", "not_taken"))
 #: Pages of somebody who has begun and has not finished.
 _UNFINISHED = tuple(
     f"questionnaire.{page}"
@@ -485,6 +511,8 @@ def _place(here: Participant | Standing | None) -> str:
         return "questionnaire.before"
     if definition.screen.check and here.screen is None:
         return "questionnaire.look_at_screen"
+    if not screen.reads_enough(here.screen, definition.screen.plates_read):
+        return "questionnaire.not_taken"
     if unfinished:
         return "questionnaire.question"
     own = len(definition.before) + len(definition.after)

@@ -13,6 +13,7 @@ from urllib.parse import urljoin
 import httpx
 
 from app.errors import InputError
+from app.plates import plates
 from app.simulation.people import Crowd
 from app.study import Study
 
@@ -146,6 +147,11 @@ class Visitor:
             if 'id="completion-code"' not in page.text:
                 raise RuntimeError(f"participant {number} got no completion code at {page.url}")
 
+    def _plates(self) -> dict[str, str]:
+        """What is on the study's colour plates: programs see all colours."""
+        shown = plates(self._study.seed, self._study.definition.screen.plates)
+        return {f"plate_{k}": plate.digit for k, plate in enumerate(shown, 1)}
+
     def _between(self, http: httpx.Client, page: httpx.Response, number: int) -> httpx.Response:
         """Answer the study's own questions and go on from instructions and rests."""
         asks = {
@@ -155,7 +161,7 @@ class Visitor:
             if form := _find(page, "rested"):
                 page = self._get(http, f"question?rested={form.fields['rested']}")
             elif form := _find(page, "window_width"):
-                page = self._send(http, page, "window_width", **SCREEN)
+                page = self._send(http, page, "window_width", **SCREEN, **self._plates())
             elif form := _find(page, "stated"):
                 filled = {
                     name: self._crowd.statement(number, asks[name])

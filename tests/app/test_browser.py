@@ -638,7 +638,7 @@ def test_axe_finds_nothing_on_the_pages_of_a_participant(tmp_path, write_study, 
         "before": [{"name": "age", "kind": "choice", "text": "Age?", "options": ["18", "19"]}],
         "after": [{"name": "words", "kind": "text", "text": "Remarks?", "required": False}],
         "reason": {"share": 1, "ticks": ["skin"]},
-        "screen": {"least_px": [1200, 600]},
+        "screen": {"least_px": [1200, 600], "plates": 2},
         "pages": {"instructions": "Look.", "debrief": "Skin.", "break_every": 1},
     }
     seen = []

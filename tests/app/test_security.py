@@ -70,6 +70,8 @@ OPEN = [
     "/resume/",
     "/resume/P0001",
     "/closed",
+    "/not-taken",
+    "/plate/1.png",
     "/study.css",
     "/health",
     "/metrics",
@@ -88,6 +90,7 @@ def addresses(app, method):
             values |= {
                 "box": "0-0-64-36",
                 "width": 64,
+                "number": 1,
                 "code": "P0001",
                 "amplify": 2,
                 "reference": sha256,
