@@ -246,7 +246,8 @@ def keep_screen():
         flow.measure(participant, kept)
         if not screen.reads_enough(kept, wanted.plates_read):
             read = f"read {measures['plates_read']} of {wanted.plates} colour plates"
-            recruiting.exclude(db, participant, f"{read}, {wanted.plates_read} are needed")
+            reason = f"{read}, {wanted.plates_read} are needed"
+            recruiting.exclude(db, participant, reason, who="rule of the study")
 
     return _record("look_at_screen", keep)
 
