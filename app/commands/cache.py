@@ -13,6 +13,8 @@ def caches() -> dict[str, tuple[Path, str]]:
 
     return {
         "heads": (folder(), "base data of generated people, fetched again when needed"),
+        "people": (folder() / "people", "generated people as arrays; made again"),
+        "light": (folder() / "light", "light baked on scenes; baked again"),
         "montecarlo": (
             cache_folder(),
             "simulated light in media; simulated again",
@@ -45,7 +47,7 @@ def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
 @click.option(
     "--clear",
     metavar="NAME",
-    type=click.Choice(["heads", "montecarlo", "reference", "converged"]),
+    type=click.Choice(["heads", "people", "light", "montecarlo", "reference", "converged"]),
     help="Remove this cache by its name. Nothing in it is lost for good.",
 )
 def command(clear: str | None) -> None:

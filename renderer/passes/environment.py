@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -39,6 +40,10 @@ class Surroundings:
             radiance = lookup(self._layers[k], towards @ turn(self.value).T)
             total = total + self.value.scale * radiance
         return total
+
+    def content(self) -> tuple:
+        """All that `radiance` follows from: the value without its file's name, and the map."""
+        return (replace(self.value, map=""), *self._layers)
 
     def mean(self) -> np.ndarray:
         """Mean radiance (3,) over all directions: the ambient intensity I_a of local models."""

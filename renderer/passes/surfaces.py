@@ -8,19 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from renderer import gl
+from renderer import caches, gl
 from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.optics import media, surface
 from renderer.optics.curve import Curve
 from renderer.optics.transmittance import TABLE, THICKNESS, Translucency, curve_of
-from renderer.passes.bake import Baked, bake, body
+from renderer.passes.bake import Baked, Body, bake, body
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
 from renderer.passes.points import COLUMNS, MOST_TRIANGLES, Points, SurfaceLists
+from renderer.scene import lights as lamps_of_a_scene
+from renderer.scene import maps as maps_of_a_scene
 from renderer.scene.graph import Contents, Item
 from renderer.scene.material import LAYERS, MAPS, MODELS, Material, Shading, Skin
 from renderer.scene.model import MASKS
@@ -31,6 +34,14 @@ FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, GL.GL_R32F)
 #: Over an atlas or points: the normal in the depth's stead, what comes through, the place in the
 #: world.
 PLACED_FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, _HALF, _HALF, GL.GL_RGBA32F)
+
+#: The code that baked light follows from.
+BAKED_BY = [
+    Path(__file__).with_name("bake.py"),
+    Path(__file__).with_name("environment.py"),
+    Path(lamps_of_a_scene.__file__),
+    Path(maps_of_a_scene.__file__),
+]
 
 Program = Callable[..., gl.Program]
 
@@ -62,7 +73,7 @@ class Surfaces:
         self.face = gl.Texture(width, height, GL.GL_RGBA32F, linear=True, data=table)
         items = [*contents.surfaces, *contents.eyes]
         bodies = [body(item) for item in items]
-        baked = bake(bodies, lights, surroundings.radiance, rays, seed) if bodies else []
+        baked = _baked(bodies, lights, surroundings, rays, seed) if bodies else []
         self.media: list[str | dict] = []
         self._transmittances: dict[tuple[int, str, str], tuple[gl.Texture, float]] = {}
         self.surfaces = [
@@ -289,6 +300,23 @@ class Surfaces:
             attributes = _attributes(part, part.masks, light, openness, scatters)
             drawn.lists = SurfaceLists(attributes, part.faces)
         return Points(drawn.lists, faces, weights, columns)
+
+
+def _baked(
+    bodies: list[Body], lights: Sequence, surroundings: Surroundings, rays: int, seed: int
+) -> list[Baked]:
+    """The light on each body, from the cache where it was baked before."""
+    meshes = [part for body in bodies for part in vars(body).values()]
+    parts = (*meshes, *lights, *surroundings.content(), rays, seed)
+    key = caches.key(parts, BAKED_BY, ("numpy", "scipy", "trimesh", "embreex"))
+
+    def make() -> caches.Arrays:
+        made = bake(bodies, lights, surroundings.radiance, rays, seed)
+        light = {f"light_{k}": one.light for k, one in enumerate(made)}
+        return light | {f"openness_{k}": one.openness for k, one in enumerate(made)}
+
+    arrays = caches.kept("light", key, make)
+    return [Baked(arrays[f"light_{k}"], arrays[f"openness_{k}"]) for k in range(len(bodies))]
 
 
 def _local(material: Shading) -> dict:

