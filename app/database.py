@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import json
 import secrets
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,10 @@ class Database:
     def __init__(self, engine: Engine):
         self._engine = engine
         self._writer = engine.execution_options(writes=True)
+        # SQLite has one writer, and who waits for it looks again after longer and longer sleeps:
+        # threads of one process rather come one after the other
+        sqlite = engine.dialect.name == "sqlite"
+        self._turn = threading.Lock() if sqlite else nullcontext()
 
     @classmethod
     def open(cls, url: str, study: Study, *, simulated: bool) -> Database:
@@ -110,15 +115,21 @@ class Database:
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        with Session(self._writer, expire_on_commit=False) as session, session.begin():
+        with self._turn, Session(self._writer, expire_on_commit=False) as session, session.begin():
             yield session
+
+    @contextmanager
+    def look(self) -> Iterator[Connection]:
+        """A reader's snapshot in plain rows, for what happens with every question."""
+        with self._engine.connect() as connection:
+            yield connection
 
     @contextmanager
     def append(self) -> Iterator[Connection]:
         """A writer's transaction in plain rows, for what happens with every answer: objects cost as
         much as the rest of it.
         """
-        with self._writer.begin() as connection:
+        with self._turn, self._writer.begin() as connection:
             yield connection
 
     def record(self) -> StudyRecord:
@@ -186,7 +197,8 @@ def _begin_sqlite(connection) -> None:
     wait.
     """
     writes = connection.get_execution_options().get("writes", False)
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+    # by the driver itself: SQLAlchemy would take as long again to hand it on
+    connection.connection.driver_connection.execute("BEGIN IMMEDIATE" if writes else "BEGIN")
 
 
 def _begin_postgresql(connection) -> None:

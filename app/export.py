@@ -23,7 +23,7 @@ from sqlalchemy.orm import Session, selectinload
 from analysis.files import replacing
 from analysis.manifest import KINDS
 from app import parquet, recruiting
-from app.models import Link, Participant, Response, Trial
+from app.models import Link, Participant, Response, Trial, participant_code
 from app.questionnaire import screen
 from app.study import Study
 from stimuli.asking import Ask
@@ -539,7 +539,9 @@ def judgements(session: Session, study: Study) -> list[dict[str, Any]]:
     names = ("participant", "familiarity", "left", "right", "order", "answer", "rt_ms", "kind")
     expected = study.definition.quality.expected
     return [
-        dict(zip(names, (f"P{number:04d}", rating, left, right, order, answer, rt_ms, kind)))
+        dict(
+            zip(names, (participant_code(number), rating, left, right, order, answer, rt_ms, kind))
+        )
         | {"expected": expected(kind, cell, left, right)}
         | levels[cell]
         for number, rating, cell, left, right, order, answer, rt_ms, kind in session.execute(

@@ -11,7 +11,7 @@ from flask_babel import Babel
 from werkzeug.exceptions import HTTPException
 from werkzeug.routing import RequestRedirect
 
-from app.catalogues import FOLDER
+from app.catalogues import FOLDER, catalogue
 from app.web import study
 from stimuli.languages import LANGUAGES, TAGS
 
@@ -24,8 +24,18 @@ blueprint = Blueprint("language", __name__)
 def init(app: Flask) -> None:
     app.config["BABEL_TRANSLATION_DIRECTORIES"] = str(FOLDER)
     Babel(app, locale_selector=current)
+    # the same catalogues, without looking for them anew at every message of a page
+    app.jinja_env.install_gettext_callables(_translated, _translated_number, newstyle=True)
     app.register_blueprint(blueprint)
     app.context_processor(_of_page)
+
+
+def _translated(text: str) -> str:
+    return catalogue(current()).gettext(text)
+
+
+def _translated_number(one: str, several: str, number: int) -> str:
+    return catalogue(current()).ngettext(one, several, number)
 
 
 def current() -> str:
@@ -39,6 +49,8 @@ def _current() -> str:
     offered = study().definition.languages
     if request.path.startswith(ENGLISH):
         return "en"
+    if len(offered) == 1:
+        return offered[0]
     chosen = session.get("language")
     if chosen in offered:
         return chosen

@@ -95,6 +95,11 @@ class StudyRecord(Base):
     )
 
 
+def participant_code(number: int) -> str:
+    """The opaque name of a participant: P0001, P0002, ..."""
+    return f"P{number:04d}"
+
+
 class Participant(Base):
     """A person who gave consent; `id` is the number that the design is drawn from."""
 
@@ -132,7 +137,7 @@ class Participant(Base):
     @property
     def code(self) -> str:
         """The opaque name in exports: P0001, P0002, ..."""
-        return f"P{self.id:04d}"
+        return participant_code(self.id)
 
 
 class Trial(Base):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from babel.support import NullTranslations
 
@@ -103,6 +105,11 @@ class Study:
         if images:
             seen["images"] = {f"{i.cell} {i.technique}": i.sha256 for i in self.manifest.shown}
         return json.loads(json.dumps(seen))
+
+    @cached_property
+    def made(self) -> dict[Hashable, Any]:
+        """What pages keep for the next ones, by what it depends on."""
+        return {}
 
     @cached_property
     def images_by_sha256(self) -> dict[str, Image]:

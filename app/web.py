@@ -4,8 +4,8 @@ friendly error pages.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NoReturn
+from collections.abc import Callable, Hashable, Iterable
+from typing import NoReturn, TypeVar
 
 from flask import (
     Blueprint,
@@ -27,6 +27,8 @@ from app import renditions
 from app.database import Database
 from app.study import Study, box_name
 from stimuli.manifest import Image
+
+T = TypeVar("T")
 
 #: A year: an image's address is the hash of its bytes, so what it names never changes.
 IMMUTABLE = "public, max-age=31536000, immutable"
@@ -79,11 +81,26 @@ def init(app: Flask) -> None:
     app.context_processor(lambda: {"simulated": simulated()})
 
 
+def kept(make: Callable[[], T], *parts: Hashable) -> T:
+    """What `make` gives, made once for everybody who asks at this address of the server.
+    parts: what it is, and what else it depends on.
+    """
+    key, made = (request.script_root, *parts), study().made
+    if key not in made:
+        made[key] = make()
+    return made[key]
+
+
 def picture(image: Image) -> dict[str, str | int]:
     """What a page's script needs to fetch and place an image: the address of its region without
     the width at which it is wanted, and the region's size in image pixels.
     """
-    return _picture(image, "web.shown", sha256=image.sha256)
+    return kept(
+        lambda: _picture(image, "web.shown", sha256=image.sha256),
+        "picture",
+        image.cell,
+        image.technique,
+    )
 
 
 def side(image: Image) -> dict[str, str | int]:
@@ -92,9 +109,12 @@ def side(image: Image) -> dict[str, str | int]:
     if boost is None:
         return picture(image)
     reference = study().manifest.reference(image.cell)
-    amplify = f"{boost.amplify:g}"
-    return _picture(
-        image, "web.boosted", sha256=image.sha256, reference=reference.sha256, amplify=amplify
+    place = {"reference": reference.sha256, "amplify": f"{boost.amplify:g}"}
+    return kept(
+        lambda: _picture(image, "web.boosted", sha256=image.sha256, **place),
+        "side",
+        image.cell,
+        image.technique,
     )
 
 

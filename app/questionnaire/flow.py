@@ -22,7 +22,16 @@ from sqlalchemy.orm import Session, undefer
 from app import recruiting
 from app.assignment import assign
 from app.database import Database
-from app.models import Event, Participant, Response, Statement, Trial, now, plain_code
+from app.models import (
+    Event,
+    Participant,
+    Response,
+    Statement,
+    Trial,
+    now,
+    participant_code,
+    plain_code,
+)
 from app.recruiting import Door
 from app.study import Study
 
@@ -162,7 +171,9 @@ def state(session: Session, participant: Participant, values: dict[str, str]) ->
         session.expire(participant)
 
 
-def upcoming(session: Session, participant: Participant, count: int) -> list[Row]:
+def upcoming(
+    session: Session | Connection, participant: Participant | Standing, count: int
+) -> list[Row]:
     """The next trials (id, order, cell, left, right), at most `count`: the current one first, then
     those whose images are worth fetching beforehand. Empty when all are answered.
     """
@@ -184,8 +195,12 @@ _UPCOMING = (
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a participant is: what says which page is due."""
+    """How far a participant is: what says which page is due, and what the page of a question says
+    of them. For what happens with every answer: loading an object costs twice as much.
+    """
 
+    id: int
+    resume_code: str | None
     familiarity: int | None
     withdrawn_at: datetime | None
     answered: int
@@ -193,6 +208,16 @@ class Standing:
     stated: int
     screen: str | None
     study_state: str
+
+    @property
+    def code(self) -> str:
+        return participant_code(self.id)
+
+
+def standing(connection: Connection, visit: str | None) -> Standing | None:
+    """How far the participant of a visit is; None before consent."""
+    row = connection.execute(_STANDING, {"visit": visit}).one_or_none() if visit else None
+    return row and Standing(*row)
 
 
 @dataclass(frozen=True)
@@ -262,15 +287,7 @@ def _answer(
     due = connection.execute(_DUE, {"trial": trial_id, "visit": visit}).one_or_none()
     if due is None:
         return None
-    here = Standing(
-        due.familiarity,
-        due.withdrawn_at,
-        due.answered,
-        due.questions,
-        due.stated,
-        due.screen,
-        due.study_state,
-    )
+    here = Standing(*due[: len(_STANDS)])
     if due.order is None or due.withdrawn_at or due.study_state == "closed":
         return Outcome.STALE, here
     if due.answer is not None:
@@ -325,17 +342,23 @@ def _answer(
     return Outcome.RECORDED, replace(here, answered=here.answered + 1)
 
 
+#: The columns of `Standing`, in its order.
+_STANDS = (
+    Participant.id,
+    Participant.resume_code,
+    Participant.familiarity,
+    Participant.withdrawn_at,
+    Participant.answered.expression.label("answered"),
+    Participant.questions.expression.label("questions"),
+    Participant.stated.expression.label("stated"),
+    Participant.screen,
+    Participant.study_state.expression.label("study_state"),
+)
+_STANDING = select(*_STANDS).where(Participant.visit == bindparam("visit"))
 _DUE = (
     select(
-        Participant.id,
-        Participant.familiarity,
-        Participant.screen,
-        Participant.withdrawn_at,
+        *_STANDS,
         Participant.consented_at,
-        Participant.answered.expression.label("answered"),
-        Participant.questions.expression.label("questions"),
-        Participant.stated.expression.label("stated"),
-        Participant.study_state.expression.label("study_state"),
         Trial.order,
         Trial.cell,
         Trial.left,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from flask import (
     Blueprint,
@@ -22,6 +22,7 @@ from flask import (
     url_for,
 )
 from flask_babel import gettext
+from markupsafe import Markup
 from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
@@ -30,7 +31,7 @@ from app.models import Participant
 from app.questionnaire import flow, screen, wording
 from app.questionnaire.flow import Answer, Outcome, Standing
 from app.recruiting import Door
-from app.web import database, picture, side, simulated, study, wants_json
+from app.web import database, kept, picture, side, simulated, study, wants_json
 from stimuli.asking import LONGEST_TEXT, Ask
 from stimuli.manifest import Image
 from stimuli.viewing import REQUIRED, VIEWS
@@ -59,8 +60,15 @@ _MEASURED = {
 
 @blueprint.context_processor
 def _wording() -> dict:
-    words = {key: str(text) for key, text in wording.QUESTION.items()}
-    return {"words": words, "mode_names": wording.MODES}
+    words = wording.question(language.current())
+    return {"words": words, "mode_names": wording.MODES, "fixed": _fixed}
+
+
+def _fixed(name: str, caller: Callable[[], Markup]) -> Markup:
+    """For templates, as {% call fixed("NAME") %}: a part of a page that is the same for everybody
+    who reads a language.
+    """
+    return kept(caller, "part", name, language.current())
 
 
 @blueprint.get("/")
@@ -183,7 +191,7 @@ def familiarity():
 @blueprint.post("/familiarity")
 def rate():
     levels = study().definition.familiarity.levels
-    value = _integer("familiarity", levels[0], levels[-1])
+    value = _integer(request.form, "familiarity", levels[0], levels[-1])
     if value not in levels:
         flash(gettext("Please choose one of the levels."))
         return redirect(url_for(".familiarity"), 303)
@@ -299,8 +307,8 @@ def _record(page: str, change: Callable[[Session, Participant], None]):
 
 @blueprint.get("/question")
 def question():
-    with database().read() as db:
-        participant = _participant(db)
+    with database().look() as db:
+        participant = flow.standing(db, session.get("visit"))
         if redirection := _redirect_to_due(participant):
             return redirection
         trial, *following = flow.upcoming(db, participant, 1 + PRELOADED_QUESTIONS)
@@ -333,7 +341,8 @@ def question():
 
 @blueprint.post("/question")
 def answer():
-    trial, value = _integer("trial", 1, 2**31 - 1), _integer("answer", -5, 5)
+    form = request.form.to_dict()
+    trial, value = _integer(form, "trial", 1, 2**31 - 1), _integer(form, "answer", -5, 5)
     if trial is None:
         abort(400, gettext("The form did not say which question it answers. Reload the page."))
     point = next((one for one in study().definition.scale if one.value == value), None)
@@ -345,14 +354,14 @@ def answer():
     given = Answer(
         value=point.counts,
         point=point.value,
-        image_left_sha256=request.form.get("image_left", ""),
-        image_right_sha256=request.form.get("image_right", ""),
-        view=_view(),
+        image_left_sha256=form.get("image_left", ""),
+        image_right_sha256=form.get("image_right", ""),
+        view=_view(form),
         language=language.current(),
-        reason_ticks=_ticks(),
-        reason_text=request.form.get("reason_text", "").strip()[:LONGEST_TEXT] or None,
+        reason_ticks=_ticks(form),
+        reason_text=form.get("reason_text", "").strip()[:LONGEST_TEXT] or None,
         **{
-            name: (_integer if kind is int else _number)(name, low, high)
+            name: (_integer if kind is int else _number)(form, name, low, high)
             for name, (kind, low, high) in _MEASURED.items()
         },
     )
@@ -520,7 +529,7 @@ def _place(here: Participant | Standing | None) -> str:
     return "questionnaire.after" if here.stated < own else "questionnaire.thanks"
 
 
-def _redirect_to_due(participant: Participant | None):
+def _redirect_to_due(participant: Participant | Standing | None):
     """A redirect to the page that is due, unless it is the one asked for."""
     place = _place(participant)
     return None if place == request.endpoint else redirect(url_for(place), 303)
@@ -541,14 +550,14 @@ def _images(trial: Row) -> list[Image]:
     return [study().image(trial.cell, side) for side in (trial.left, trial.right)]
 
 
-def _ticks() -> str | None:
+def _ticks(form: Mapping[str, str]) -> str | None:
     """The numbers of the words that were ticked for a reason, from 1."""
     count = len(study().definition.reason.ticks)
-    ticked = [str(k) for k in range(1, count + 1) if request.form.get(f"reason_{k}") == "yes"]
+    ticked = [str(k) for k in range(1, count + 1) if form.get(f"reason_{k}") == "yes"]
     return ";".join(ticked) or None
 
 
-def _asks_reason(participant: Participant, order: int) -> bool:
+def _asks_reason(participant: Standing, order: int) -> bool:
     return study().definition.reason.applies(f"{study().seed}/{participant.id}", order)
 
 
@@ -560,28 +569,28 @@ def _pauses(answered: int) -> bool:
     return bool(pages.break_every) and answered % pages.break_every == 0
 
 
-def _view() -> str | None:
+def _view(form: Mapping[str, str]) -> str | None:
     """The view in which an answer was given; a browser without scripts names none and no time."""
-    modes, named = study().definition.viewer.modes, request.form.get("view", "")
-    if not named and not request.form.get("rt_ms"):
+    modes, named = study().definition.viewer.modes, form.get("view", "")
+    if not named and not form.get("rt_ms"):
         return UNSCRIPTED
     return named if named in modes else None
 
 
-def _integer(name: str, low: int, high: int) -> int | None:
+def _integer(form: Mapping[str, str], name: str, low: int, high: int) -> int | None:
     """A whole number in a field of the form; None where it is absent, not a number or out of
     range.
     """
     try:
-        value = int(request.form.get(name, ""))
+        value = int(form.get(name, ""))
     except ValueError:
         return None
     return value if low <= value <= high else None
 
 
-def _number(name: str, low: float, high: float) -> float | None:
+def _number(form: Mapping[str, str], name: str, low: float, high: float) -> float | None:
     try:
-        value = float(request.form.get(name, ""))
+        value = float(form.get(name, ""))
     except ValueError:
         return None
     return value if low < value <= high else None

@@ -280,3 +280,25 @@ def test_texts_of_every_kind_are_translated_and_part_of_what_was_seen(tmp_path, 
     path.write_text(json.dumps(manifest))
     with pytest.raises(errors.InputError, match=r"text\.en\.pages\.debrief was 'End\.'"):
         create_app(folder)
+
+
+def test_what_is_kept_of_a_page_is_kept_for_each_language(person, app):
+    """Parts of a question that are the same for everybody are made once: each reader gets those of
+    their language, and the address under which the server is asked.
+    """
+    pages = {}
+    for name in ("en", "it", "en", "it"):
+        visitor = person()
+        visitor.http.environ_base["HTTP_ACCEPT_LANGUAGE"] = name
+        text = re.sub(r'value="[^"]+"|data-\w+="[^"]*"', "", visitor.begin().page.text)
+        pages.setdefault(name, []).append(text)
+        assert ("Immagine" in text, "Quale è più reale?" in text) == (name == "it",) * 2
+        assert ("Confirm" in text, "Which is more real?" in text) == (name == "en",) * 2
+    pieces = {
+        name: re.findall(r"(?s)<fieldset.*?</fieldset>", "".join(two))
+        for name, two in pages.items()
+    }
+    assert all(len(two) == 2 and two[0] == two[1] for two in pieces.values())
+    assert pieces["it"][0] != pieces["en"][0]
+    below = visitor.http.get("/question", base_url="http://localhost/elsewhere").text
+    assert 'src="/elsewhere/images/' in below and 'src="/images/' not in below
