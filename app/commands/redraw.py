@@ -14,8 +14,9 @@ import click
     multiple=True,
     metavar="NAME",
     help=(
-        "One of 001-4.4, 001-4.5, 001-4.6, 000-2.14, 000-2.15, 000-2.17, 000-3.5, 000-3.6, "
-        "translucency, transmittance; repeat for more. All if not given."
+        "One of 001-4.4, 001-4.5, 001-4.6, 001-5.1, 000-2.14, 000-2.15, 000-2.17, 000-3.3, "
+        "000-3.4, 000-3.5, 000-3.6, 000-3.9, translucency, transmittance; repeat for more. All if "
+        "not given."
     ),
 )
 @click.option(
@@ -38,7 +39,7 @@ import click
 )
 def command(folder, wanted, suffix, photons, seed):
     """Draw the documents' figures of profiles again into DIR: dipole and multipole of marble
-    (Rohat), Burley's fits against Monte Carlo, guided kernels and the artist's Gaussians (Vuletic).
+    (Rohat), Burley's fits against Monte Carlo, separable kernels, discs of samples (Vuletic).
 
     With a million photons the three figures that need them take about a minute.
     """

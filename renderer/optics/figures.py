@@ -243,7 +243,7 @@ def guided_kernels(photons: int, seed: int):
     """
     plt = pyplot()
     reach = 6.0
-    profile = lambda r: gaussians.reflectance(r)[:, 0]
+    profile = _red
     kernels = [
         separable.svd(profile, reach),
         *(separable.guided(profile, reach, k) for k in (0, 2)),
@@ -274,6 +274,100 @@ def guided_kernels(photons: int, seed: int):
         axis.set(title=f"a(x) a(y) {title}", xlabel="r (mm)", xlim=(0, 5), ylim=(1e-6, 50))
     axes[0].set_ylabel("1/mm²")
     axes[1].legend(fontsize=8)
+    return figure
+
+
+RANKS = (1, 2, 3, 6)
+
+
+def _red(r: np.ndarray) -> np.ndarray:
+    """Red of d'Eon and Luebke's skin, (M,) mm -> 1/mm^2."""
+    return gaussians.reflectance(r)[:, 0]
+
+
+def singular_values(photons: int, seed: int):
+    """Vuletic fig. 3.3: singular values of skin's red profile over the plane."""
+    plt = _pyplot()
+    _, values, _ = separable.decompose(_red, 6.0)
+    figure, axis = plt.subplots(figsize=(5, 3.4))
+    shown = np.abs(values[:12]) / values[0]
+    axis.bar(np.arange(1, 13), shown, color="#0072b2")
+    axis.set(yscale="log", ylim=(1e-6, 2), xlabel="number", ylabel="singular value over the first")
+    axis.set_xticks(np.arange(1, 13))
+    whole = (values**2).sum()
+    axis.set_title(f"the first holds {100 * values[0] ** 2 / whole:.1f} % of the squares")
+    return figure
+
+
+def ranks(photons: int, seed: int):
+    """Vuletic fig. 3.4: skin's red profile and what its decomposition gives by rank."""
+    plt = _pyplot()
+    x, values, vectors = separable.decompose(_red, 6.0)
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True)
+    for axis, diagonal in zip(axes, (False, True), strict=True):
+        r = np.maximum(x * (np.sqrt(2) if diagonal else 1), 0.02)
+        axis.semilogy(r, _red(r), color="#b0b0b0", lw=4, label="profile")
+        colours = ("#000000", "#0072b2", "#d55e00", "#009e73")
+        for rank, colour in zip(RANKS, colours, strict=True):
+            other = vectors[:, :rank] if diagonal else vectors[:1, :rank]
+            value = (values[:rank] * vectors[:, :rank] * other).sum(axis=1)
+            axis.semilogy(
+                r, np.where(value > 1e-9, value, np.nan), color=colour, lw=1.3, label=f"rank {rank}"
+            )
+        where = "the diagonal" if diagonal else "an axis"
+        axis.set(title=f"along {where}", xlabel="r (mm)", xlim=(0, 5), ylim=(1e-6, 50))
+    axes[0].set_ylabel("1/mm²")
+    axes[1].legend(fontsize=8)
+    return figure
+
+
+def discs(photons: int, seed: int):
+    """Vuletic fig. 3.9: one set of distances, by Burley's inverse CDF, at random angles and at
+    Fibonacci's.
+    """
+    from renderer.optics import burley
+
+    plt = _pyplot()
+    count = 64
+    r = burley.inverse_cdf((np.arange(count) + 0.5) / count)
+    golden = (np.sqrt(5) - 1) / 2
+    turns = {
+        "random": np.random.default_rng(seed).random(count),
+        "Fibonacci": np.arange(count) * golden % 1,
+    }
+    figure, axes = plt.subplots(1, 2, figsize=(7, 3.6), sharex=True, sharey=True)
+    for axis, (name, turn) in zip(axes, turns.items(), strict=True):
+        phi = 2 * np.pi * turn
+        axis.plot(r * np.cos(phi), r * np.sin(phi), "o", ms=3.5, color="#0072b2")
+        axis.set(title=f"{name} angles", xlabel="x / d", aspect="equal")
+    axes[0].set_ylabel("y / d")
+    return figure
+
+
+def sampled_profile(photons: int, seed: int):
+    """Rohat fig. 5.1: marble's dipole as textures of few entries, linear between them; and how far
+    off that is, beside the one that splats take (entries by the square root of the distance).
+    """
+    plt = _pyplot()
+    profile = models.make("dipole", preset("marble"))
+    reach, r = 6.0, np.linspace(0.005, 6.0, 3000)
+    exact = profile.reflectance(r)[:, 0]
+    figure, (axis, errors) = plt.subplots(1, 2, figsize=(9, 3.5))
+    axis.plot(r, exact, color="#b0b0b0", lw=4, label="dipole, marble, red")
+    for count, colour in ((16, "#d55e00"), (64, "#0072b2"), (256, "#009e73")):
+        at = (np.arange(count) + 0.5) / count
+        for power, line in ((1, "-"), (2, ":")):
+            place = reach * at**power
+            got = np.interp(r, place, profile.reflectance(place)[:, 0])
+            label = f"{count} entries" if power == 1 else f"{count}, by the root of r"
+            worst = np.abs(got - exact).reshape(-1, 75).max(axis=1)  # of 0.15 mm
+            errors.semilogy(r[37::75], worst, color=colour, ls=line, label=label)
+            if power == 1 and count < 256:
+                axis.plot(r, got, color=colour, label=label)
+    axis.set(xlim=(0, 2.5), ylim=(0, None), xlabel="r (mm)", ylabel="R$_d$(r)  (1/mm²)")
+    axis.legend(fontsize=8)
+    errors.set(xlabel="r (mm)", ylabel="off by at most (1/mm²)", ylim=(1e-7, 0.1))
+    errors.legend(fontsize=7)
     return figure
 
 
@@ -378,7 +472,11 @@ FIGURES = {
     "000-2.14": _burley("mfp", "Searchlight, mean free path", (4.9, 5.5)),
     "000-2.15": _burley("dmfp", "Searchlight, diffuse mean free path", (6.4, 7.7)),
     "000-2.17": _burley("diffuse", "Diffuse transmission, mean free path", (2.6, 3.9)),
+    "000-3.3": singular_values,
+    "000-3.4": ranks,
     "000-3.5": guided_kernels,
     "000-3.6": artist_profile,
+    "000-3.9": discs,
+    "001-5.1": sampled_profile,
     "translucency": translucency,
 }

@@ -155,20 +155,29 @@ def _kernel(method: str, x: np.ndarray, half: np.ndarray, R: np.ndarray) -> Kern
     )
 
 
+def decompose(
+    profile: Callable, reach_mm: float, points: int = 200
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The singular value decomposition of R(x, y) on the whole plane, which is symmetric: x (N,)
+    mm from 0, singular values (N,) falling, with their signs, and vectors (N, N) over x, a column
+    each, so that R = sum of value v(x) v(y).
+    """
+    x = half_grid(reach_mm, points)
+    root = np.sqrt(np.where(np.arange(len(x)) == 0, 1, 2))
+    values, vectors = np.linalg.eigh(root[:, None] * quadrant(profile, x) * root)
+    order = np.argsort(-np.abs(values))
+    return x, values[order], vectors[:, order] / root[:, None]
+
+
 def svd(profile: Callable, reach_mm: float, points: int = 200) -> Kernel:
     """The rank-one part of the singular value decomposition: least RMS error of all products, but
     it does not keep the energy.
 
     profile: radii (M,) mm -> values (M,), any scale.
     """
-    x = half_grid(reach_mm, points)
-    R = quadrant(profile, x)
-    root = np.sqrt(
-        np.where(np.arange(len(x)) == 0, 1, 2)
-    )  # the decomposition of the whole symmetric plane
-    values, vectors = np.linalg.eigh(root[:, None] * R * root)
-    half = np.sqrt(values[-1]) * np.abs(vectors[:, -1]) / root
-    return _kernel("svd", x, half, R)
+    x, values, vectors = decompose(profile, reach_mm, points)
+    half = np.sqrt(values[0]) * np.abs(vectors[:, 0])
+    return _kernel("svd", x, half, quadrant(profile, x))
 
 
 def guide(x: np.ndarray, y: np.ndarray, k: float, b: float = GUIDE_B) -> np.ndarray:

@@ -260,7 +260,8 @@ def test_fit_separable(run, tmp_path, method):
 
 
 def test_redraw(run, tmp_path):
-    quick = ["001-4.4", "001-4.5", "001-4.6", "000-3.5", "000-3.6", "translucency"]
+    quick = ["001-4.4", "001-4.5", "001-4.6", "001-5.1", "000-3.3", "000-3.4", "000-3.5", "000-3.6"]
+    quick += ["000-3.9", "translucency"]
     code, out, _ = run(
         "redraw", "figures", *(word for name in quick for word in ("--figure", name))
     )
