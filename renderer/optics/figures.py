@@ -287,7 +287,7 @@ def _red(r: np.ndarray) -> np.ndarray:
 
 def singular_values(photons: int, seed: int):
     """Vuletic fig. 3.3: singular values of skin's red profile over the plane."""
-    plt = _pyplot()
+    plt = pyplot()
     _, values, _ = separable.decompose(_red, 6.0)
     figure, axis = plt.subplots(figsize=(5, 3.4))
     shown = np.abs(values[:12]) / values[0]
@@ -301,7 +301,7 @@ def singular_values(photons: int, seed: int):
 
 def ranks(photons: int, seed: int):
     """Vuletic fig. 3.4: skin's red profile and what its decomposition gives by rank."""
-    plt = _pyplot()
+    plt = pyplot()
     x, values, vectors = separable.decompose(_red, 6.0)
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True)
     for axis, diagonal in zip(axes, (False, True), strict=True):
@@ -327,7 +327,7 @@ def discs(photons: int, seed: int):
     """
     from renderer.optics import burley
 
-    plt = _pyplot()
+    plt = pyplot()
     count = 64
     r = burley.inverse_cdf((np.arange(count) + 0.5) / count)
     golden = (np.sqrt(5) - 1) / 2
@@ -348,7 +348,7 @@ def sampled_profile(photons: int, seed: int):
     """Rohat fig. 5.1: marble's dipole as textures of few entries, linear between them; and how far
     off that is, beside the one that splats take (entries by the square root of the distance).
     """
-    plt = _pyplot()
+    plt = pyplot()
     profile = models.make("dipole", preset("marble"))
     reach, r = 6.0, np.linspace(0.005, 6.0, 3000)
     exact = profile.reflectance(r)[:, 0]
