@@ -8,6 +8,7 @@ import click
 VERBS = {
     "render": "app.commands.render",
     "techniques": "app.commands.techniques",
+    "head": "app.commands.head",
     "compare": "app.commands.compare",
     "experiment": "app.commands.experiment",
     "build": "app.commands.build",

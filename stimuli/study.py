@@ -7,11 +7,13 @@ its analysis (`analysis`: margins, tests, exclusions) may be left out too. Nothi
 nothing here knows which techniques and framings there are: `stimuli.build` asks the renderer.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import product
 from math import prod
 from pathlib import Path
+from typing import Any
 
 from analysis.declared import options
 from analysis.manifest import WHOLE, read_region, read_self_rating
@@ -43,7 +45,7 @@ from stimuli.languages import (
 )
 from stimuli.parts import read_toml
 from stimuli.recruiting import Recruiting, read_recruiting
-from stimuli.scenes import load_table, merge
+from stimuli.scenes import load_table, merge, person_table
 from stimuli.table import Table, refuse_doubles
 from stimuli.viewing import ONE_TO_ONE, Viewer, read_viewer
 
@@ -106,7 +108,21 @@ RESERVED = frozenset(
 #: Points of a scale at most, and up to how many all of them have words.
 LONGEST_SCALE, WORDED = 11, 5
 UNITS = ("mm", "cm", "m", "in")  # of a scan's coordinates
-AXES = ("y", "z")  # that can point upwards in a scan
+#: What [head] says of a scan besides its unit: fields of renderer.scene.objects.Scan and looks.
+SAID_OF_HEAD = (
+    "up",
+    "forward",
+    "yaw_deg",
+    "head_mm",
+    "mm_per_unit",
+    "landmarks",
+    "edge_mm",
+    "licence",
+    "credit",
+    "albedo",
+    "normal",
+    "skin",
+)
 _WORDING = ("question", "scale", "familiarity", "consent")
 
 
@@ -412,20 +428,35 @@ def load_study(path: str | Path) -> Study:
     return study
 
 
-def with_head(scene: dict, name: str, unit: str | None = None, up: str | None = None) -> dict:
-    """The scene with another head: "default" for its own, a person by name, or a scan's file."""
+def with_head(scene: dict, name: str, said: Mapping[str, Any] | None = None) -> dict:
+    """The scene with another head: "default" for its own, a person by name, or a scan's file.
+
+    said: of a scan, `renderer.scene.objects.Scan`'s fields, and `albedo` and `normal` (images) and
+    `skin` (a person) for what its file lacks; None values say nothing.
+    """
+    said = {key: value for key, value in (said or {}).items() if value is not None}
+    if not Path(name).suffix and said:
+        raise InputError(
+            f"{', '.join(sorted(said))} is for a scan's file, and the head is {name!r}"
+        )
     if name == DEFAULT_HEAD:
         return scene
     subject = scene.get("subject", next(iter(scene.get("objects", {"head": {}}))))
     own = scene.get("objects", {}).get(subject, {})
     place = {key: own[key] for key in ("position_mm", "rotation_deg", "scale") if key in own}
+    materials = dict(scene.get("materials", {}))
     if Path(name).suffix:
-        options = {"unit": unit, "up": up}
-        shape = {"shape": "scan", "file": name, **{k: v for k, v in options.items() if v}}
+        looks = {f"{key}_map": said.pop(key) for key in ("albedo", "normal") if key in said}
+        if "skin" in said:
+            skin = {"kind": "skin", **person_table(said.pop("skin")).get("skin", {})}
+            looks = {**skin, **looks}
+        if looks:
+            materials[subject] = merge(looks, materials.get(subject, {}))
+        shape = {"shape": "scan", "file": name, **said}
     else:
         shape = {"shape": "person", "person": name}
     objects = {**scene.get("objects", {}), subject: {**place, **shape}}
-    return {**scene, "objects": objects}
+    return {**scene, "objects": objects, **({"materials": materials} if materials else {})}
 
 
 def read_study(
@@ -721,8 +752,12 @@ def _size(table: Table) -> tuple[int, int]:
 
 
 def _head(table: Table, beside: Path) -> dict:
-    """[head] of a study: its name, unit and upward axis, for `with_head`."""
+    """[head] of a study: its name and what is said of a scan, for `with_head`."""
     name = table.text("name", default=DEFAULT_HEAD)
     file = str(beside / name) if Path(name).suffix else name
-    units, axes = table.one_of("unit", UNITS, default=None), table.one_of("up", AXES, default=None)
-    return {"name": file, "unit": units, "up": axes}
+    said = {"unit": table.one_of("unit", UNITS, default=None)}
+    said |= {key: table.take(key, object, "a value") for key in SAID_OF_HEAD if key in table.value}
+    for key in ("landmarks", "albedo", "normal", "skin"):
+        if isinstance(said.get(key), str) and Path(said[key]).suffix:
+            said[key] = str(beside / said[key])
+    return {"name": file, "said": said}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from app import drawing
 from app import workers as working
 
 
@@ -16,22 +17,10 @@ from app import workers as working
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the images and manifest.json; made when it is not there.",
 )
-@click.option(
-    "--head",
-    help=(
-        'Head to show instead of the scene\'s: "default" for its own, a person by name, or a scan, '
-        "FILE.glb or FILE.obj."
-    ),
-)
-@click.option(
-    "--unit",
-    type=click.Choice(["mm", "cm", "m", "in"]),
-    help="Unit of the scan's coordinates; guessed, and said, when not given.",
-)
-@click.option(
-    "--up",
-    type=click.Choice(["y", "z"]),
-    help="The scan's upward axis; found out, and said, when not given.",
+@drawing.head(
+    None,
+    'Head to show instead of the scene\'s: "default" for its own, a person by name, or a scan: '
+    ".glb, .gltf, .obj, .ply, .stl.",
 )
 @click.option(
     "--time",
@@ -52,8 +41,7 @@ def command(
     study: Path,
     out: Path,
     head: str | None,
-    unit: str | None,
-    up: str | None,
+    said: dict,
     rounds: int,
     workers: int | None,
     cluster: str | None,
@@ -65,11 +53,11 @@ def command(
     stopped.
     """
     from stimuli.build import build
-    from stimuli.study import load_study, with_head
+    from stimuli.study import DEFAULT_HEAD, load_study, with_head
 
     definition = load_study(study)
-    if head:
-        scene = with_head(definition.scene, head, unit, up)
+    if head or any(value is not None for value in said.values()):
+        scene = with_head(definition.scene, head or DEFAULT_HEAD, said)
         definition = replace(definition, scene=scene)
     with working.crew(workers, cluster) as crew:
         built = build(definition, out, force, True, rounds, crew.executor, crew.workers)

@@ -70,21 +70,8 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     "A value over the scene's, by its dotted key, in JSON or as text: rig=noon, "
     "camera.yaw_deg=0, lights.rim=false; repeat for more."
 )
-@click.option(
-    "--head",
-    default="default",
-    show_default=True,
-    help="The scene's own head, a person by name, or a scan as .glb, .gltf or .obj.",
-)
-@click.option(
-    "--unit",
-    type=click.Choice(["mm", "cm", "m", "in"]),
-    help="Unit of the scan's coordinates; guessed and said if not given.",
-)
-@click.option(
-    "--up",
-    type=click.Choice(["y", "z"]),
-    help="The scan's upward axis; found out and said if not given.",
+@drawing.head(
+    "default", "The scene's own head, a person by name, or a scan: .glb, .gltf, .obj, .ply, .stl."
 )
 @drawing.supersample(2, "Samples a pixel")
 @drawing.seed("hair, skin noise and baked light")
@@ -110,8 +97,7 @@ def command(
     scene,
     patches,
     head,
-    unit,
-    up,
+    said,
     supersample,
     seed,
     samples,
@@ -136,7 +122,7 @@ def command(
             known = ", ".join(renderer.FRAMINGS)
             raise InputError(f"no framing {framing!r}; expected one of {known}")
         table = merge(table, {"camera": {"framing": framing}})
-    definition = read_scene(with_head(table, head, unit, up))
+    definition = read_scene(with_head(table, head, said))
     _writable(out, (".png",))
     if samples:
         _writable(samples, (".npy",))

@@ -13,6 +13,7 @@ from renderer.parameters import Parameters, parameter
 
 UNITS = ("mm", "cm", "m", "in")
 UP_AXES = ("y", "z")
+AXES = ("x", "-x", "y", "-y", "z", "-z")
 #: Of a knot's radius: its strands come within 0.554 of it.
 WIDEST_TUBE = 0.27
 
@@ -66,13 +67,33 @@ class Person(Object):
 
 @dataclass(frozen=True)
 class Scan(Object):
-    """A user's head: .glb, .gltf or .obj; unit and upward axis are found out where not given."""
+    """A user's head: .glb, .gltf, .obj, .ply or .stl. How it stands is found out where not given.
+
+    `up` and `forward` are axes of the file; `yaw_deg` turns the head to its left after that.
+    `head_mm` is its height from crown to chin, `mm_per_unit` scales the file's coordinates;
+    `landmarks` names a TOML file of points in them. Coarse scans are subdivided smoothly until
+    their edges are `edge_mm` long at most half of them.
+    """
 
     shape: ClassVar[str] = "scan"
 
     file: str = parameter("scan.glb", source="the user's")
     unit: str | None = parameter((None, "mm"), choices=(None, *UNITS), optional=True)
-    up: str | None = parameter((None, "y"), choices=(None, *UP_AXES), optional=True)
+    up: str | None = parameter((None, "y"), choices=(None, *AXES), optional=True)
+    forward: str | None = parameter((None, "z"), choices=(None, *AXES), optional=True)
+    yaw_deg: float | None = parameter(
+        (None, 0.0), unit="degrees", low=-360.0, high=360.0, optional=True
+    )
+    head_mm: float | None = parameter((None, 206.0), unit="mm", low=60.0, high=900.0, optional=True)
+    mm_per_unit: float | None = parameter(
+        (None, 1.0), unit="mm a unit of the file", low=1e-6, high=1e6, optional=True
+    )
+    landmarks: str | None = parameter((None, "landmarks.toml"), optional=True)
+    edge_mm: float = parameter(
+        2.5, unit="mm", low=0.2, high=1000.0, source="a pixel of a 1080p close-up is .13 mm"
+    )
+    licence: str | None = parameter((None, "CC-BY-4.0"), optional=True)
+    credit: str | None = parameter((None, "who made it"), optional=True)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from renderer.scene import Model
+from renderer.scene.objects import Scan
 from stimuli.parts import PEOPLE, part, read_toml
 
 
@@ -41,15 +42,38 @@ def load_person(name_or_path: str = "man", seed: int = 0) -> Head:
     return Head(path.stem, person_model(person, seed), origin, [fetch.LICENCE])
 
 
-def load_scan(path: str, unit: str | None = None, up: str | None = None) -> Head:
-    """A user's scan: a .glb, .gltf or .obj file.
+def load_scan(scan: Scan) -> Head:
+    """A user's scan: a .glb, .gltf, .obj, .ply or .stl file and what the scene says of it.
 
-    unit: of its coordinates (mm, cm, m, in), up: its upward axis (y, z); None to find out. The
-    eyes are taken from parts named so, else from proportions.
-    Raises stimuli.errors.InputError for a file that cannot be used.
+    How it stands is found out where the scene does not say (stimuli.heads.placing); the eyes are
+    taken from parts named so, else from the face. Raises stimuli.errors.InputError for a file that
+    cannot be used.
     """
+    from stimuli.heads.placing import Asked, by_face
     from stimuli.heads.scan import read_scan
     from stimuli.heads.scan_model import scan_model
 
-    scan = read_scan(path, unit, up)
-    return Head(scan.name, scan_model(scan), scan.provenance(), [], scan.notes)
+    asked = Asked(
+        scan.unit,
+        scan.up,
+        scan.forward,
+        scan.yaw_deg,
+        scan.head_mm,
+        scan.mm_per_unit,
+        scan.landmarks,
+    )
+    read = read_scan(scan.file, asked, by_face)
+    notes, terms = list(read.notes), {"what": read.name, "source": "the user's scan"}
+    credit = scan.credit or read.copyright
+    if scan.licence is None:
+        notes.append(
+            f"{read.name}: its licence is not said; give licence and credit, which are kept in the "
+            "manifest and shown beside the study"
+        )
+    terms |= {"licence": scan.licence or "not said"}
+    terms |= {"credit": credit} if credit else {}
+    model = scan_model(read, scan.edge_mm)
+    before, after = len(read.positions_mm), len(model.surface.positions)
+    if after > before:
+        notes.append(f"{read.name}: it was subdivided smoothly, {before} points to {after}")
+    return Head(read.name, model, read.provenance(), [terms], tuple(notes))

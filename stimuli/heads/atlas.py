@@ -18,6 +18,7 @@ UNKNOWN_COLOUR = (
     0.8,
 )  # linear: of a part without colour among coloured ones; what MTL viewers show
 UNKNOWN_ROUGHNESS = 0.5
+GREY = 0.03  # linear: no skin's channels are as near as that; modelling programs show such colours
 
 
 def combine(source: Source, parts: list[Part]) -> tuple[list[Part], Material]:
@@ -30,6 +31,13 @@ def combine(source: Source, parts: list[Part]) -> tuple[list[Part], Material]:
     for part in parts:
         if part.uvs is None and _has_texture(part.material):
             raise source.error(f"the part {part.name!r} has a texture but no texture coordinates")
+    if not any(_has_texture(part.material) for part in parts):
+        tints = [part.material.base_colour for part in parts if part.material.base_colour]
+        if tints and all(max(tint) - min(tint) <= GREY for tint in tints):
+            source.note(
+                "its colours are greys and were left out; give an albedo image or a person's skin"
+            )
+            return parts, Material()
     looks = {_look(part.material): part.material for part in parts}
     materials = list(looks.values())
     if len(materials) == 1:

@@ -1,5 +1,5 @@
-"""A user's own head: one triangle mesh in millimetres from a .glb, .gltf or .obj file, or one line
-that says why not.
+"""A user's own head: one triangle mesh in millimetres from a file (`READERS`), or one line that
+says why not.
 
 What is asked of a file, for shading and occlusion to be right:
 
@@ -11,38 +11,38 @@ What is asked of a file, for shading and occlusion to be right:
   bad, else they are told of. The same holds for neighbouring faces that disagree about which side
   is out, unless the file has normals. Hair and films over the eye, by their names, are cards and
   exempt.
-* The size of a head, in a unit that is given, that the format lays down (glTF: metres), or that
-  makes the size plausible.
-* Y up, the face towards +z, as glTF lays down; a file with z up (the face towards -y) is turned.
-  For OBJ, which does not say, the longer of the two is taken as the height.
+* How it is to stand (unit, upward axis, turn) is for stimuli.heads.placing to find out.
 """
 
 import os
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from stimuli.errors import InputError
 from stimuli.heads.atlas import combine
-from stimuli.heads.formats import Part, Source, gltf, obj
+from stimuli.heads.formats import Part, Source, gltf, obj, soup
+from stimuli.heads.placing import Asked, Placing, by_size
 
-READERS = {".glb": gltf.read, ".gltf": gltf.read, ".obj": obj.read}
-UNITS_MM = {"m": 1000.0, "cm": 10.0, "mm": 1.0, "in": 25.4}
-"""Millimetres a unit, in the order in which a guess tries them."""
+Place = Callable[[Source, np.ndarray, np.ndarray, Asked, bool], Placing]
 
-HEAD_MM = (120.0, 900.0)  # largest extent: from a face alone to a broad bust
-BODY_MM = 2300.0  # largest extent of a whole person with arms out
-# a whole person's least extent is below this part of the largest; a head's or bust's is not
-SLENDER = 0.35
-# with z up, the height (z) exceeds the depth (y) by more than this; heads have 1.15 or more
-Z_UP_RATIO = 1.1
-NON_MANIFOLD_LIMIT = 1e-4
+READERS = {
+    ".glb": gltf.read,
+    ".gltf": gltf.read,
+    ".obj": obj.read,
+    ".ply": soup.read,
+    ".stl": soup.read,
+}
+KNOWN = "expected a head as .glb, .gltf, .obj, .ply or .stl"
+ELSEWHERE = (".fbx", ".blend", ".usd", ".usda", ".usdc", ".usdz", ".dae", ".ztl", ".max", ".3ds")
+NON_MANIFOLD_LIMIT = 0.005
 """Fraction of all edges that may have more than two faces, or (without normals) two faces that
 disagree.
 """
+WITHOUT_AREA_LIMIT = 0.1  # of all faces: with more of them the file is broken
 
 KINDS = {
     "hair": (
@@ -83,10 +83,8 @@ class Scan:
     part_kinds: tuple[
         str, ...
     ]  # skin, eye, mouth, hair or shell: by the name, skin where it says nothing
-    unit: str  # mm, cm, m or in
-    unit_source: str  # given, format or guessed
-    up: str  # y or z, in the file
-    up_source: str  # given, format or guessed
+    placing: Placing  # from the file's coordinates to these
+    copyright: str | None  # what the file says of it (glTF's asset.copyright)
     files: dict[str, str]  # sha256 of each file that was read, by the name it was referred to
     notes: tuple[str, ...]  # what the user should be told, one line each
 
@@ -94,12 +92,9 @@ class Scan:
         """What a manifest records: the files by their sha256, and how they were understood. No path
         of the machine.
         """
-        understood = {
-            name: getattr(self, name) for name in ("unit", "unit_source", "up", "up_source")
-        }
         return {
             "files": self.files,
-            **understood,
+            **self.placing.provenance(),
             "parts": dict(zip(self.part_names, self.part_kinds, strict=True)),
         }
 
@@ -107,25 +102,27 @@ class Scan:
 @np.errstate(
     over="ignore", invalid="ignore"
 )  # what is not finite is refused, and needs no warning besides
-def read_scan(path: str | Path, unit: str | None = None, up: str | None = None) -> Scan:
-    """Read a head from a .glb, .gltf or .obj file with its textures.
+def read_scan(path: str | Path, asked: Asked | None = None, place: Place = by_size) -> Scan:
+    """Read a head from a file with its textures (`READERS`).
 
-    `unit` is that of the file's positions (mm, cm, m or in) and `up` its upward axis (y or z); None
-    has them taken from the format or found out, and said in the notes. Whatever keeps the head from
-    being used raises one line (`InputError`).
+    asked: what the user says of how it stands; place: what finds out the rest, and says so in the
+    notes. Whatever keeps the head from being used raises one line (`InputError`).
     """
+    asked = asked or Asked()
     source = Source(Path(path))
     reader = READERS.get(source.path.suffix.lower())
-    if unit not in (None, *UNITS_MM):
-        raise InputError(f"the unit {unit!r} is unknown; expected one of {', '.join(UNITS_MM)}")
-    if up not in (None, "y", "z"):
-        raise InputError(f"the upward axis {up!r} is unknown; expected y or z")
     if not os.path.isfile(source.path):
-        raise source.error("is not a file; expected a head as .glb, .gltf or .obj")
+        raise source.error(f"is not a file; {KNOWN}")
     if reader is None:
-        raise source.error(f"has the suffix {source.path.suffix!r}; expected .glb, .gltf or .obj")
+        suffix = source.path.suffix
+        if suffix.lower() in ELSEWHERE:
+            raise source.error(
+                f"has the suffix {suffix!r}, which is not read; export it as .glb from the program "
+                "that wrote it (Blender: File, Export, glTF 2.0)"
+            )
+        raise source.error(f"has the suffix {suffix!r}; {KNOWN}")
     if not source.path.stat().st_size:
-        raise source.error("is empty; expected a head as .glb, .gltf or .obj")
+        raise source.error(f"is empty; {KNOWN}")
 
     parts = [part for part in reader(source) if len(part.faces)]
     if not parts:
@@ -142,19 +139,15 @@ def read_scan(path: str | Path, unit: str | None = None, up: str | None = None) 
         )
         kinds = ("skin",) * len(names)
     mesh = _join(parts, names, kinds)
+    _turn_outside_out(source, mesh)
 
-    of_format = reader is gltf.read
-    up, up_source = _upward(source, mesh.extents(), up, of_format)
-    if up == "z":
-        mesh.positions, mesh.normals = (
-            vectors[:, [0, 2, 1]] * (1, 1, -1) for vectors in (mesh.positions, mesh.normals)
-        )
-    unit, unit_source = _unit(source, mesh.extents(), unit, of_format)
-    mesh.positions = (mesh.positions * UNITS_MM[unit]).astype(np.float32)
+    skin = np.array([kind == "skin" for kind in kinds])[mesh.part_of_face]
+    placing = place(source, mesh.positions, mesh.faces[skin], asked, reader is gltf.read)
+    mesh.positions = placing.place(mesh.positions).astype(np.float32)
+    mesh.normals = mesh.normals @ placing.rotation.T
 
     _drop_faces_without_use(source, mesh)
     _check_surface(source, mesh, kinds)
-    _turn_outside_out(source, mesh)
     _complete_normals(mesh)
 
     used, faces = np.unique(mesh.faces, return_inverse=True)
@@ -171,10 +164,8 @@ def read_scan(path: str | Path, unit: str | None = None, up: str | None = None) 
         parts=mesh.part_of_face.astype(np.int32),
         part_names=names,
         part_kinds=kinds,
-        unit=unit,
-        unit_source=unit_source,
-        up=up,
-        up_source=up_source,
+        placing=placing,
+        copyright=source.copyright,
         files=dict(source.files),
         notes=tuple(source.notes),
     )
@@ -260,65 +251,6 @@ def _check_finite(source: Source, part: Part) -> None:
             )
 
 
-def _upward(
-    source: Source, extents: np.ndarray, given: str | None, of_format: bool
-) -> tuple[str, str]:
-    """Which axis is up, and how that is known."""
-    if given:
-        return given, "given"
-    if of_format:
-        return "y", "format"
-    _, y, z = extents
-    if z <= Z_UP_RATIO * y:
-        return "y", "guessed"
-    source.note(
-        f"z was taken as up, since the head is longer along z ({z:.4g}) than along y "
-        f"({y:.4g}); say which is up if that is wrong"
-    )
-    return "z", "guessed"
-
-
-def _unit(
-    source: Source, extents: np.ndarray, given: str | None, of_format: bool
-) -> tuple[str, str]:
-    """The unit of the positions, and how that is known."""
-    largest, slender = extents.max(), extents.min() < SLENDER * extents.max()
-    expected = (
-        f"expected {HEAD_MM[0] / 1000} to {HEAD_MM[1] / 1000} m, or up to "
-        f"{BODY_MM / 1000} m for a whole body"
-    )
-
-    def sized_like_somebody(unit: str) -> bool:
-        return HEAD_MM[0] <= largest * UNITS_MM[unit] <= BODY_MM
-
-    if given:
-        if not sized_like_somebody(given):
-            raise source.error(
-                f"is {largest * UNITS_MM[given] / 1000:.4g} m across if its unit is {given}; "
-                f"{expected}"
-            )
-        return given, "given"
-    if of_format and sized_like_somebody("m"):
-        return "m", "format"
-    likely = (
-        unit
-        for unit in UNITS_MM
-        if sized_like_somebody(unit) and (slender or largest * UNITS_MM[unit] <= HEAD_MM[1])
-    )
-    unit = next(likely, None)
-    if unit is None:
-        raise source.error(
-            f"is {largest:.4g} units across, which is no head in {', '.join(UNITS_MM)} "
-            f"({expected}); give its unit, or scale it first"
-        )
-    size = f"{largest * UNITS_MM[unit] / 10:.4g} cm across"
-    source.note(
-        f"the unit was taken as {unit}, which makes the head {size}; say which it is if that "
-        "is wrong"
-    )
-    return unit, "guessed"
-
-
 def _drop_faces_without_use(source: Source, mesh: _Mesh) -> None:
     """Drop faces without area, and all but the first of those over the same three points."""
     a, b, c = np.sort(mesh.points[mesh.faces], axis=1).T
@@ -326,6 +258,11 @@ def _drop_faces_without_use(source: Source, mesh: _Mesh) -> None:
     whole = (a != b) & (b != c) & (twice_area > 1e-12 * mesh.extents().max() ** 2)
     if not whole.any():
         raise source.error(f"has {len(whole)} faces, all without area; expected a surface")
+    if (~whole).mean() > WITHOUT_AREA_LIMIT:
+        raise source.error(
+            f"is broken: {(~whole).sum()} of its {len(whole)} faces have no area; expected at most "
+            f"{WITHOUT_AREA_LIMIT:.0%}"
+        )
     if not whole.all():
         source.note(f"{(~whole).sum()} of its {len(whole)} faces have no area and were left out")
     order = np.lexsort((c, b, a))  # stable: the first of equals stays

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import sparse
 
 from renderer.scene import MASKS, Material, Model, Proxy, Surface
-from stimuli.heads import eyes
+from stimuli.heads import eyes, template
 from stimuli.heads.anatomy import Eyeball
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
 CLUSTER_MM = 3.0
 SKIN_COLOUR = (0.56, 0.38, 0.30)  # linear albedo of a scan without any colour of its own
-EYES_BELOW_CROWN_MM = 112.0  # half an adult head's height
+EYES_BELOW_CROWN_MM = 112.0  # half an adult head's height: of a head whose face is not found
+MATCH_MM = (
+    12.0  # how far apart surfaces count that face a radian apart, where masks are carried over
+)
+LEVELS = 3  # of subdivision, at most
+FINE_LIMIT = 250_000  # faces: no finer above
 
 
 def _clustered(
@@ -50,29 +57,105 @@ def _clustered(
     )
 
 
-def _scan_landmarks(p: np.ndarray, eye_points: np.ndarray | None) -> dict[str, np.ndarray]:
-    """Where the eyes, nose and mouth of an upright head that looks along +z must be: from its eye
-    parts, else its proportions.
+def _landmarks(scan, p: np.ndarray, eye_points: np.ndarray | None) -> dict[str, np.ndarray]:
+    """Where eyes, nose and mouth of an upright head that looks along +z are: given ones, those of
+    its eye parts and of the face that was found, else its proportions.
     """
+    fit = scan.placing.fit
+    if fit is None:
+        marks = _by_proportions(p)
+    else:
+        shape = template.load().landmarks
+        marks = {name: scan.placing.place(fit.place(at)) for name, at in shape.items()}
+        near = p[np.linalg.norm(p - marks["nose"], axis=1) < 12]
+        if len(near):  # its tip is the foremost point about there
+            marks["nose"] = near[near[:, 2].argmax()]
+        about = p[np.linalg.norm((p - marks["crown"])[:, [0, 2]], axis=1) < 60]
+        if len(about):
+            marks["crown"] = about[about[:, 1].argmax()]
+    if eye_points is not None:
+        middle = marks["eyes"][0]
+        apart = np.array([np.abs(eye_points[:, 0] - middle).mean(), 0, 0])
+        eyes = np.array([middle, eye_points[:, 1].mean(), eye_points[:, 2].mean()])
+        marks |= {"eyes": eyes, "eye_l": eyes + apart, "eye_r": eyes - apart}
+    marks |= scan.placing.landmarks
+    if {"eye_l", "eye_r"} & set(scan.placing.landmarks):
+        marks["eyes"] = 0.5 * (marks["eye_l"] + marks["eye_r"])
+    return marks
+
+
+def _by_proportions(p: np.ndarray) -> dict[str, np.ndarray]:
     crown = p[:, 1].max()
     head = p[p[:, 1] > crown - 200]
     middle = 0.5 * (np.quantile(head[:, 0], 0.01) + np.quantile(head[:, 0], 0.99))
     face = head[(np.abs(head[:, 0] - middle) < 15) & (head[:, 1] < crown - 90)]
     nose = face[face[:, 2].argmax()] if len(face) else head[head[:, 2].argmax()]
-    if eye_points is None:
-        eyes = np.array([middle, crown - EYES_BELOW_CROWN_MM, nose[2] - 40])
-        apart = 31.0
-    else:
-        eyes = np.array([middle, eye_points[:, 1].mean(), eye_points[:, 2].mean()])
-        apart = np.abs(eye_points[:, 0] - middle).mean()
-    side = np.array([apart, 0, 0])
-    return {
-        "eyes": eyes,
-        "eye_l": eyes + side,
-        "eye_r": eyes - side,
-        "nose": nose,
-        "mouth": np.array([middle, eyes[1] - 70, nose[2] - 12]),
-    }
+    eyes = np.array([middle, crown - EYES_BELOW_CROWN_MM, nose[2] - 40])
+    side = np.array([31.0, 0, 0])
+    mouth = np.array([middle, eyes[1] - 70, nose[2] - 12])
+    return {"eyes": eyes, "eye_l": eyes + side, "eye_r": eyes - side, "nose": nose, "mouth": mouth}
+
+
+def _masks(scan, p: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Where the skin is what (N, len(MASKS)), from the average head; none without a face. Below
+    the head it is as at its lower edge.
+    """
+    from scipy.spatial import cKDTree
+
+    fit, placing = scan.placing.fit, scan.placing
+    if fit is None:
+        return np.zeros((len(p), len(MASKS)), np.float32)
+    shape, turn = template.load(), fit.rotation.T @ placing.rotation.T
+    own = fit.back(p @ placing.rotation / placing.mm_per_unit)
+    facing = normals @ turn.T
+    # a surface that faces the same way, among the near ones
+    tree = cKDTree(np.hstack([shape.points, MATCH_MM * shape.normals]))
+    distance, index = tree.query(np.hstack([own, MATCH_MM * facing]), k=4)
+    weight = 1 / (distance + 1.0) ** 2
+    weight /= weight.sum(axis=1, keepdims=True)
+    masks = (shape.masks[index] * weight[..., None]).sum(axis=1)
+    for name in ("hair", "beard", "inside"):  # a scan brings its own, or none
+        masks[:, MASKS.index(name)] = 0
+    return masks.astype(np.float32)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
+
+
+def _finer(positions, normals, uvs, faces, edge_mm):
+    """The surface with each face in four until half of its edges are `edge_mm` or shorter, and the
+    matrix (new, old) that carries a value along. New points lie on the cubic of curved PN triangles
+    (Vlachos et al. 2001, doi:10.1145/364338.364387), so old ones stay and silhouettes are round.
+    """
+    carry = sparse.identity(len(positions), format="csr")
+    # one normal a place, or surfaces part at seams where they have several
+    _, same = np.unique(positions, axis=0, return_inverse=True)
+    bend = np.stack([np.bincount(same.ravel(), weights=axis) for axis in normals.T], axis=1)
+    bend = _unit(bend[same.ravel()])
+    for _ in range(LEVELS):
+        ends = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        edges, of = np.unique(ends, axis=0, return_inverse=True)
+        a, b = edges.T
+        along = positions[b] - positions[a]
+        if np.median(np.linalg.norm(along, axis=1)) <= edge_mm or len(faces) > FINE_LIMIT:
+            break
+        n = len(positions)
+        rise = (along * bend[a]).sum(axis=1, keepdims=True) * bend[a]
+        rise -= (along * bend[b]).sum(axis=1, keepdims=True) * bend[b]
+        middle = 0.5 * (positions[a] + positions[b]) - rise / 8
+        between, curved = (_unit(field[a] + field[b]) for field in (normals, bend))
+        rows = np.repeat(np.arange(len(edges)), 2)
+        half = sparse.csr_matrix((np.full(rows.size, 0.5), (rows, edges.ravel())), (len(edges), n))
+        carry = sparse.vstack([carry, half @ carry], format="csr")
+        positions, normals = np.vstack([positions, middle]), np.vstack([normals, between])
+        bend = np.vstack([bend, curved])
+        uvs = np.vstack([uvs, 0.5 * (uvs[a] + uvs[b])])
+        ab, bc, ca = (n + of.reshape(-1, 3)).T
+        i, j, k = faces.T
+        quarters = ((i, ab, ca), (ab, j, bc), (ca, bc, k), (ab, bc, ca))
+        faces = np.stack([np.column_stack(q) for q in quarters], axis=1).reshape(-1, 3)
+    return positions, normals, uvs, faces, carry
 
 
 def _own_eyes(points: np.ndarray) -> tuple[Eyeball, ...]:
@@ -89,9 +172,9 @@ def _own_eyes(points: np.ndarray) -> tuple[Eyeball, ...]:
     return tuple(balls) if all(8 < ball.radius < 18 for ball in balls) else ()
 
 
-def scan_model(scan) -> Model:
-    """A user's scan: its own maps on its skin; eyes and teeth drawn without scattering; hair as
-    surface.
+def scan_model(scan, edge_mm: float = 2.5) -> Model:
+    """A user's scan, subdivided to edges of `edge_mm`: its own maps on its skin; eyes and teeth
+    drawn without scattering; hair as surface.
 
     Left out: clear shells over the eyes, and cards of lashes and brows, which are nothing without
     their alpha. Eyes without a texture are replaced by the default head's.
@@ -121,7 +204,13 @@ def scan_model(scan) -> Model:
         proxy = _clustered(positions, normals, faces, albedo)
     else:
         proxy = Proxy(positions, normals, faces, albedo, sparse.identity(len(used), format="csr"))
-    uvs = np.zeros((len(used), 2)) if scan.uvs is None else scan.uvs[used]
+    uvs = np.zeros((len(used), 2)) if scan.uvs is None else scan.uvs[used].astype(float)
+    coarse = len(used)
+    positions, normals, uvs, faces, carry = _finer(positions, normals, uvs, faces, edge_mm)
+    if len(positions) > coarse:
+        proxy = replace(proxy, to_full=(carry @ proxy.to_full).tocsr())
+    masks = _masks(scan, positions, normals)
+    near = _masks(scan, proxy.positions, proxy.normals)
     own = {
         "albedo_map": scan.albedo,
         "normal_map": scan.normal_map,
@@ -132,16 +221,16 @@ def scan_model(scan) -> Model:
         normals.astype(np.float32),
         uvs.astype(np.float32),
         faces.astype(np.uint32),
-        np.zeros((len(used), len(MASKS)), dtype=np.float32),
-        proxy,
+        masks,
+        replace(proxy, masks=near),
         {name: image for name, image in own.items() if image is not None},
         tuple(colour),
-        scatters,
+        carry @ scatters,
     )
     return Model(
         surface,
         tuple(eyes.eyeball(ball) for ball in balls),
         None,
-        _scan_landmarks(positions, eye_points),
+        _landmarks(scan, positions, eye_points),
         material=Material(albedo=tuple(float(v) for v in colour)),
     )

@@ -146,4 +146,4 @@ def _file_keys(table: dict[str, Any]) -> Iterator[tuple[dict, str]]:
 
 
 def _names_file(section: str, key: str) -> bool:
-    return key == "file" if section == "objects" else key.endswith(MAP_ENDING)
+    return key in ("file", "landmarks") if section == "objects" else key.endswith(MAP_ENDING)

@@ -56,7 +56,7 @@ def _model(thing: objects.Object, scene: Scene, seed: int):
         if isinstance(thing, objects.Person):
             head = load_person(thing.person, seed)
         else:
-            head = load_scan(thing.file, thing.unit, thing.up)
+            head = load_scan(thing)
             own = head.model.surface.base_colour
             if own is not None and material.albedo == Material().albedo:
                 material = replace(material, albedo=tuple(float(v) for v in own))

@@ -108,13 +108,14 @@ def test_hair_repeats_for_one_seed_and_changes_with_it(anatomy, model):
 def test_a_scan_renders(tmp_path):
     import trimesh
 
+    from stimuli.heads.placing import Asked
     from stimuli.heads.scan import read_scan
 
     ball = trimesh.creation.icosphere(5, 0.5)
     ball.apply_scale((160, 235, 200))
     file = tmp_path / "ball.obj"
     ball.export(file)
-    scan = read_scan(file, unit="mm")
+    scan = read_scan(file, Asked(unit="mm"))
     model = scan_model(scan)
     graph = SceneGraph(Environment((0.5, 0.5, 0.5)), subject=model.landmarks["eyes"])
     graph.add_model(model, np.eye(4))
@@ -140,6 +141,7 @@ def write_parts(file, parts):
 def test_an_uncoloured_scan_gets_eyes_and_loses_cards_and_shells(tmp_path):
     import trimesh
 
+    from stimuli.heads.placing import Asked
     from stimuli.heads.scan import read_scan
 
     skull = trimesh.creation.icosphere(4, 0.5)
@@ -154,7 +156,7 @@ def test_an_uncoloured_scan_gets_eyes_and_loses_cards_and_shells(tmp_path):
     shell.apply_scale(1.02)
     parts += [("EyeOcclusion", shell), ("Eyelashes", shell.copy())]
     write_parts(tmp_path / "head.obj", parts)
-    model = scan_model(read_scan(tmp_path / "head.obj", unit="mm"))
+    model = scan_model(read_scan(tmp_path / "head.obj", Asked(unit="mm")), edge_mm=1000)
     # eyes replaced, shell and cards gone
     assert len(model.surface.positions) == len(skull.vertices)
     assert [round(float(eye.centre[0])) for eye in model.eyes] == [31, -31]
@@ -166,6 +168,7 @@ def test_a_large_scan_is_baked_on_a_cluster(monkeypatch, tmp_path):
     import trimesh
 
     from stimuli.heads import scan_model as module
+    from stimuli.heads.placing import Asked
     from stimuli.heads.scan import read_scan
 
     ball = trimesh.creation.icosphere(5, 120.0)
@@ -173,7 +176,7 @@ def test_a_large_scan_is_baked_on_a_cluster(monkeypatch, tmp_path):
     ball.export(file)
     monkeypatch.setattr(module, "PROXY_LIMIT", 1000)
     monkeypatch.setattr(module, "CLUSTER_MM", 12.0)
-    proxy = scan_model(read_scan(file, unit="mm")).surface.proxy
+    proxy = scan_model(read_scan(file, Asked(unit="mm")), edge_mm=1000).surface.proxy
     assert len(proxy.positions) < 5000 and proxy.faces.max() < len(proxy.positions)
     assert (
         np.linalg.norm(

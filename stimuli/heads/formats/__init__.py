@@ -68,6 +68,7 @@ class Source:
         default_factory=dict
     )  # name as referenced, no absolute path -> sha256
     notes: list[str] = field(default_factory=list)
+    copyright: str | None = None  # what the file says of whose it is
 
     def error(self, message: str) -> InputError:
         """The error to raise, with the file named first."""

@@ -57,9 +57,7 @@ def read(source: Source) -> list[Part]:
             f"{len(error.doc)}"
         ) from None
     except RecursionError:
-        raise source.error(
-            "is not valid glTF: its nodes contain themselves or are nested too deeply"
-        ) from None
+        raise source.error("is not valid glTF: its nodes are nested too deeply") from None
     except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError) as error:
         reason = f"{type(error).__name__}: {error}".replace("\n", " ")
         raise source.error(
@@ -187,6 +185,8 @@ class _Document:
         self.buffers = [
             self._buffer(i, buffer, binary) for i, buffer in enumerate(document.get("buffers", []))
         ]
+        source.copyright = str(document["asset"].get("copyright", "")).strip()[:200] or None
+        self.placed: set[int] = set()  # nodes: they form trees (3.5.2)
         self.images: dict[int, np.ndarray] = {}
         self.materials: dict[int, Material] = {}
 
@@ -233,33 +233,63 @@ class _Document:
         1] (3.6.2).
         """
         accessor = self._item("accessors", index)
-        if "sparse" in accessor or "bufferView" not in accessor:
-            raise self.source.error(
-                f"stores accessor {index} in sparse or compressed form, which is not read; "
-                "export it plainly"
-            )
         dtype, columns, count = (
             np.dtype(COMPONENT[accessor["componentType"]]),
             COLUMNS[accessor["type"]],
             accessor["count"],
         )
-        data, stride = self._view(accessor["bufferView"])
-        start, stride = accessor.get("byteOffset", 0), stride or dtype.itemsize * columns
-        if (
-            count < 1
-            or start < 0
-            or start + (count - 1) * stride + dtype.itemsize * columns > len(data)
-        ):
+        if "bufferView" in accessor:
+            place = accessor["bufferView"], accessor.get("byteOffset", 0)
+            values = self._items(index, *place, dtype, columns, count)
+        elif "sparse" in accessor:
+            self._count(index, count)
+            values = np.zeros((count, columns))
+        else:
+            raise self.source.error(
+                f"stores accessor {index} in compressed form, which is not read; export it plainly"
+            )
+        if "sparse" in accessor:  # 3.6.2.3
+            values = self._replaced(index, values, accessor["sparse"], dtype)
+        if accessor.get("normalized"):
+            values = np.maximum(values / np.iinfo(dtype).max, -1.0)
+        return values
+
+    def _items(self, index, view, start, dtype, columns, count) -> np.ndarray:
+        """`count` items of a buffer view for accessor `index`: (count, columns) float64."""
+        data, stride = self._view(view)
+        stride = stride or dtype.itemsize * columns
+        self._count(index, count)
+        if start < 0 or start + (count - 1) * stride + dtype.itemsize * columns > len(data):
             raise self.source.error(
                 f"is not valid glTF: accessor {index} asks for {count} items, more than its "
                 "bufferView has"
             )
         strides = (stride, dtype.itemsize)
-        values = np.ndarray((count, columns), dtype.newbyteorder("<"), data, start, strides).astype(
-            np.float64
-        )
-        if accessor.get("normalized"):
-            values = np.maximum(values / np.iinfo(dtype).max, -1.0)
+        values = np.ndarray((count, columns), dtype.newbyteorder("<"), data, start, strides)
+        return values.astype(np.float64)
+
+    def _count(self, index: int, count: int) -> None:
+        """Refuse a number of items that no file of this size can mean."""
+        most = max(1_000_000, 100 * sum(map(len, self.buffers)))
+        if type(count) is not int or not 1 <= count <= most:
+            raise self.source.error(
+                f"is not valid glTF: accessor {index} asks for {count} items, more than its "
+                "buffers have"
+            )
+
+    def _replaced(self, index: int, values: np.ndarray, sparse: dict, dtype) -> np.ndarray:
+        """The values of accessor `index` with those that its sparse part gives."""
+        count, where, what = sparse["count"], sparse["indices"], sparse["values"]
+        kind = np.dtype(COMPONENT[where["componentType"]])
+        at = self._items(
+            index, where["bufferView"], where.get("byteOffset", 0), kind, 1, count
+        ).astype(np.int64)[:, 0]
+        if at.min() < 0 or at.max() >= len(values):
+            raise self.source.error(
+                f"is not valid glTF: accessor {index} replaces item {at.max()} of {len(values)}"
+            )
+        place = what["bufferView"], what.get("byteOffset", 0)
+        values[at] = self._items(index, *place, dtype, values.shape[1], count)
         return values
 
     def parts(self) -> list[Part]:
@@ -276,6 +306,11 @@ class _Document:
     def _placed(self, index: int, outer: np.ndarray) -> list[Part]:
         """The parts below a node, in the scene's space."""
         node = self._item("nodes", index)
+        if index in self.placed:
+            raise self.source.error(
+                f"is not valid glTF: node {index} has two parents or is its own; expected trees"
+            )
+        self.placed.add(index)
         matrix = outer @ _local_matrix(node)
         parts = []
         if "mesh" in node:

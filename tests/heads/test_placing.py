@@ -1,0 +1,251 @@
+"""Scans that stand awkwardly: each is understood, or one line says why not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from renderer.scene.objects import Scan
+from stimuli.errors import InputError
+from stimuli.heads import anatomy, fetch, load_scan, mpfb, register, template
+from stimuli.heads.formats import Source
+from stimuli.heads.person import Person
+from stimuli.heads.placing import Asked, by_face, by_size
+from stimuli.heads.subdivide import triangles
+from stimuli.parts import PEOPLE, part, read_toml
+
+pytestmark = pytest.mark.network
+
+ORDER = ("eye_l", "eye_r", "nose", "mouth", "chin")
+
+
+def turn(axis: str, degrees: float) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+
+
+def person(name: str):
+    return Person.read(read_toml(part(name, PEOPLE, "person")), name)
+
+
+@pytest.fixture(scope="module")
+def heads():
+    """Name -> points (N, 3) mm, faces, true landmarks; no hair and no eyes."""
+    made = {}
+    for name in ("woman", "man_dark"):
+        built = anatomy.build_anatomy(fetch.mpfb_data(), person(name), 1)
+        bust, balls = built.levels[0], built.eyes
+        marks = {**built.landmarks, "eye_l": balls[0].centre, "eye_r": balls[1].centre}
+        made[name] = bust.positions, triangles(bust.quads), marks
+    return made
+
+
+@pytest.fixture
+def source(tmp_path):
+    return Source(tmp_path / "scan.obj")
+
+
+def cut(points, faces, keep):
+    faces = faces[keep[faces].all(axis=1)]
+    used, faces = np.unique(faces, return_inverse=True)
+    return points[used], faces.reshape(-1, 3)
+
+
+def with_hair(points):
+    """A hairdo of a third of the head's size, above and behind."""
+    points = points.copy()
+    hair = (points[:, 1] > -75) | ((points[:, 2] < 20) & (points[:, 1] > -200))
+    points[hair] = [0, -100, 40] + (points[hair] - [0, -100, 40]) * 1.35
+    return points
+
+
+# name: (head, change of points and faces, rotation, units a mm, unit, up, turned)
+AWKWARD = {
+    "as it should be": ("woman", None, np.eye(3), 1e-3, "m", "y", 0),
+    "a bust in inches": ("woman", None, np.eye(3), 1 / 25.4, "in", "y", 0),
+    "from behind": ("man_dark", None, turn("y", 180), 1.0, "mm", "y", 180),
+    "turned by 46 degrees": ("man_dark", None, turn("y", 46), 0.1, "cm", "y", 46),
+    "z up": ("woman", None, turn("x", 90), 1.0, "mm", "z", 0),
+    "z up, looking along y": ("woman", None, turn("x", 90) @ turn("y", 180), 1.0, "mm", "z", 180),
+    "upside down": ("man_dark", None, turn("z", 180), 1.0, "mm", "-y", 0),
+    "lying, x up": ("woman", None, turn("z", -90), 0.1, "cm", "x", 0),
+    "a unit-normalised head": ("man_dark", "head", np.eye(3), 1 / 250, "scaled", "y", 0),
+    "a mask": ("woman", "mask", turn("y", -90), 1.0, "mm", "y", -90),
+    "a hairdo": ("man_dark", "hair", np.eye(3), 0.1, "cm", "y", 0),
+    "noise of 1.5 mm": ("woman", "noise", turn("y", -100), 1.0, "mm", "y", -100),
+}
+
+
+@pytest.mark.parametrize("name", AWKWARD)
+def test_an_awkward_head_is_put_upright_and_to_its_size(heads, source, name):
+    who, change, rotation, scale, unit, up, turned = AWKWARD[name]
+    points, faces, marks = heads[who]
+    if change == "head":
+        points, faces = cut(points, faces, points[:, 1] > -260)
+    elif change == "mask":
+        points, faces = cut(points, faces, (points[:, 2] > 60) & (points[:, 1] > -240))
+    elif change == "hair":
+        points = with_hair(points)
+    elif change == "noise":
+        points = points + np.random.default_rng(1).normal(size=points.shape) * 1.5
+    file = scale * points @ rotation.T
+    placed = by_face(source, file, faces, Asked(), name == "as it should be")
+    assert (placed.unit, placed.up) == (unit, up)
+    assert placed.turned_deg == pytest.approx(turned, abs=4)
+    height = placed.fit.height * placed.mm_per_unit
+    true = -marks["chin"][1]
+    if unit == "scaled":
+        assert height == pytest.approx(template.load().height_mm)
+        true = true * height / true
+    else:
+        assert height == pytest.approx(true, rel=0.04)
+    # landmarks within a centimetre; upright, looking along +z
+    found = placed.place(placed.fit.place(np.array([template.load().landmarks[n] for n in ORDER])))
+    shrunk = placed.mm_per_unit * scale
+    wanted = np.array([marks[n] for n in ORDER]) * shrunk
+    assert np.linalg.norm(found - wanted, axis=1).mean() < 10
+    assert found[0, 0] > 0 > found[1, 0] and found[2, 2] > found[:2, 2].max()
+    silent = placed.unit_source == "format" and turned == 0
+    assert bool(source.notes) != silent
+
+
+def test_bodies_and_children_have_their_heads_found(source):
+    data = fetch.mpfb_data()
+    base = mpfb.read_base(data)
+    child = {
+        "macrodetails/african-female-child": 1.0,
+        "macrodetails/universal-female-child-averagemuscle-averageweight": 1.0,
+    }
+    for targets in (person("woman").targets, child):
+        points = mpfb.morph(data, base.positions, targets) * mpfb.MM_PER_UNIT
+        faces = triangles(base.quads)
+        fit = register.fit(points @ turn("y", 140).T, faces)
+        assert fit.found and 165 < fit.height < 215
+        assert np.degrees(np.arccos(fit.forward @ turn("y", 140)[:, 2])) < 5
+
+
+def test_shapes_without_a_face_are_said_to_have_none(source):
+    import trimesh
+
+    ball = trimesh.creation.icosphere(3)
+    shapes = {
+        "egg": (ball.vertices * [75, 110, 95], ball.faces),
+        "box": (lambda b: (b.vertices, b.faces))(
+            trimesh.creation.box((150, 220, 190)).subdivide().subdivide().subdivide()
+        ),
+    }
+    assert not register.fit(*map(np.asarray, shapes["box"])).found
+    egg = shapes["egg"]
+    placed = by_face(source, np.asarray(egg[0]), np.asarray(egg[1]), Asked(), False)
+    assert placed.fit is None and placed.unit == "mm"
+    assert any("no face was found" in note for note in source.notes)
+    with pytest.raises(InputError, match="no face that could be found.*give a scale or landmarks"):
+        by_face(source, np.asarray(egg[0]), np.asarray(egg[1]), Asked(head_mm=200), False)
+
+
+def test_one_triangle_is_no_head(source):
+    triangle = np.array([[0, 0, 0], [100.0, 0, 0], [0, 200, 0]])
+    with pytest.raises(InputError, match="1 faces.*expected the surface of a head"):
+        by_face(source, triangle, np.array([[0, 1, 2]]), Asked(), False)
+
+
+def test_what_is_given_goes_over_what_is_found(heads, source, tmp_path):
+    points, faces, marks = heads["woman"]
+    placed = by_face(source, points, faces, Asked(head_mm=250.0, yaw_deg=30.0), False)
+    assert placed.fit.height * placed.mm_per_unit == pytest.approx(250)
+    ahead = placed.rotation @ [0, 0, 1]
+    assert np.degrees(np.arctan2(ahead[0], ahead[2])) == pytest.approx(30)
+    file = tmp_path / "marks.toml"
+    file.write_text("".join(f"{n} = {marks[n].tolist()}\n" for n in ORDER), encoding="utf-8")
+    given = by_face(source, points, faces, Asked(landmarks=str(file), unit="mm"), False)
+    np.testing.assert_allclose(given.landmarks["nose"], marks["nose"], atol=1e-9)
+    side = by_face(source, points, faces, Asked(forward="x", unit="mm"), False)
+    np.testing.assert_allclose(side.rotation @ [1, 0, 0], [0, 0, 1], atol=1e-12)
+    with pytest.raises(InputError, match="mm high from crown to chin if its unit is m"):
+        by_face(source, points, faces, Asked(unit="m"), False)
+    with pytest.raises(InputError, match="cannot look along y with y up"):
+        by_size(source, points, faces, Asked(forward="y", up="y"), False)
+    for text, words in (
+        ("nose = [1, 2, 3]\n", "three or more"),
+        ("noze = [1, 2, 3]\n", "'noze'"),
+        ("nose = 1\nchin = [0,0,0]\nmouth = [0,1,0]\n", r"nose is 1; expected \[x, y, z\]"),
+    ):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=words):
+            by_face(source, points, faces, Asked(landmarks=str(file)), False)
+
+
+def test_the_shipped_template_is_the_one_that_is_made():
+    made = template.make(fetch.mpfb_data())
+    with np.load(template.FILE) as kept:
+        assert set(kept.files) == set(made)
+        for name in ("points", "faces", "names", "landmarks"):
+            np.testing.assert_array_equal(kept[name], made[name])
+
+
+@pytest.fixture
+def coarse(heads, tmp_path):
+    """A coarse head in an STL file: no names, no normals, no colours."""
+    import trimesh
+
+    points, faces, _ = heads["woman"]
+    file = tmp_path / "coarse.stl"
+    trimesh.Trimesh(points, faces, process=False).export(file)
+    return file
+
+
+def test_a_scan_gets_masks_landmarks_and_a_smooth_surface(coarse):
+    from renderer.scene import MASKS
+
+    head = load_scan(Scan(file=str(coarse), licence="CC0-1.0", credit="MakeHuman"))
+    surface, marks = head.model.surface, head.model.landmarks
+    lips = surface.positions[surface.masks[:, MASKS.index("lips")] > 0.5]
+    assert len(lips) > 50 and np.linalg.norm(lips.mean(axis=0) - marks["mouth"]) < 15
+    nose = surface.masks[np.linalg.norm(surface.positions - marks["nose"], axis=1).argmin()]
+    chest = surface.masks[surface.positions[:, 1].argmin()]
+    assert nose[MASKS.index("oil")] > chest[MASKS.index("oil")]
+    # finer than the file, whose points all stay
+    assert any("subdivided" in note for note in head.notes)
+    from scipy.spatial import cKDTree
+
+    plain = load_scan(Scan(file=str(coarse), edge_mm=1000.0, licence="CC0-1.0")).model.surface
+    assert len(surface.positions) > 10 * len(plain.positions)
+    assert cKDTree(surface.positions).query(plain.positions)[0].max() < 1e-4
+    assert head.licences == [
+        {
+            "what": "coarse",
+            "source": "the user's scan",
+            "licence": "CC0-1.0",
+            "credit": "MakeHuman",
+        }
+    ]
+
+
+def test_a_ball_is_rounder_for_being_subdivided(tmp_path):
+    import trimesh
+
+    from stimuli.heads.scan_model import _finer
+
+    ball = trimesh.creation.icosphere(2, 100.0)
+    points, normals = np.array(ball.vertices), np.array(ball.vertices) / 100
+    fine, across, _, faces, carry = _finer(points, normals, points[:, :2], ball.faces, 10.0)
+    assert len(faces) == 16 * len(ball.faces) and carry.shape == (len(fine), len(points))
+    assert np.abs(np.linalg.norm(fine, axis=1) - 100).max() < 0.1  # flat ones: 1.5 mm inside
+    np.testing.assert_allclose(across, fine / 100, atol=0.01)
+    np.testing.assert_allclose(carry @ np.ones(len(points)), 1)
+
+
+def test_head_draws_a_sheet(coarse, tmp_path, capsys):
+    from PIL import Image
+
+    from app.cli import main
+
+    out = tmp_path / "sheet.png"
+    assert main(["head", str(coarse), "--out", str(out)]) == 0
+    words = capsys.readouterr().out
+    assert "mm from crown to chin" in words and "licence is not said" in words
+    with Image.open(out) as image:
+        assert min(image.size) > 600 and np.asarray(image).std() > 10
+    assert main(["head", str(coarse), "--out", str(tmp_path / "sheet.xyz")]) != 0
+    assert "expected .png, .pdf or .svg" in capsys.readouterr().err
