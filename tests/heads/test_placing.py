@@ -248,4 +248,4 @@ def test_head_draws_a_sheet(coarse, tmp_path, capsys):
     with Image.open(out) as image:
         assert min(image.size) > 600 and np.asarray(image).std() > 10
     assert main(["head", str(coarse), "--out", str(tmp_path / "sheet.xyz")]) != 0
-    assert "expected .png, .pdf or .svg" in capsys.readouterr().err
+    assert "expected .png, .pdf, .svg" in capsys.readouterr().err

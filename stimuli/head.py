@@ -1,12 +1,19 @@
-"""A picture of how a head was understood: from the front and from the side, with its landmarks."""
+"""How a scan is understood, in words and a picture: front and side, with its landmarks."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
 import numpy as np
 
 from renderer.scene import Model
+from renderer.scene.objects import Scan
+from stimuli.errors import InputError
+from stimuli.heads import load_scan
+from stimuli.study import with_head
 
 BAR_MM = 50.0
 #: Views: (name, axis to the right, axis towards the eye); the head's left is +x.
@@ -14,6 +21,37 @@ VIEWS = (
     ("front", np.array([1.0, 0, 0]), np.array([0, 0, 1.0])),
     ("from its left", np.array([0, 0, -1.0]), np.array([1.0, 0, 0])),
 )
+
+
+ENDINGS = (".png", ".pdf", ".svg")
+
+
+def understand(file: str, said: Mapping[str, Any], out: Path) -> list[str]:
+    """Write the sheet of a scan's file to `out` and return what is to be said of it.
+
+    said: see stimuli.study.with_head. Raises InputError for a file that cannot be used.
+    """
+    if out.suffix not in ENDINGS:
+        raise InputError(f"{out}: has the suffix {out.suffix!r}; expected {', '.join(ENDINGS)}")
+    table = with_head({"objects": {"head": {}}}, file, said)["objects"]["head"]
+    if table.pop("shape") != "scan":
+        raise InputError(f"{file}: is no file of a scan; expected .glb, .gltf, .obj, .ply or .stl")
+    head = load_scan(Scan.read(table, "head"))
+    known = head.provenance
+    lines = [
+        f"{len(head.model.surface.positions)} points; {known['mm_per_unit']:.6g} mm a unit "
+        f"({known['unit']}, {known['unit_source']}); {known['up']} up ({known['up_source']}); "
+        f"turned by {known['turned_deg']:g} degrees ({known['turned_source']})"
+    ]
+    if "face" in known:
+        face = known["face"]
+        lines.append(
+            f"face: {face['crown_to_chin_mm']:g} mm from crown to chin; the average head fits it "
+            f"to {face['error_mm']:g} mm, with {face['relief']:.0%} of its relief"
+        )
+    lines += head.notes
+    _draw(head.model, head.name, lines, out)
+    return lines
 
 
 def _seen(model: Model, right, towards, left_mm, top_mm, size, step_mm) -> np.ndarray:
@@ -36,7 +74,7 @@ def _seen(model: Model, right, towards, left_mm, top_mm, size, step_mm) -> np.nd
     return grey.reshape(height, width)
 
 
-def draw(model: Model, name: str, lines: list[str], out: Path, step_mm: float = 0.5) -> None:
+def _draw(model: Model, name: str, lines: list[str], out: Path, step_mm: float = 0.5) -> None:
     """Write the sheet of a model to a picture; lines: what else is said of it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -83,12 +121,6 @@ def draw(model: Model, name: str, lines: list[str], out: Path, step_mm: float = 
         axes.set(title=title, xlim=extent[:2], ylim=extent[2:], xlabel="mm")
         axes.tick_params(labelsize=8)
     figure.suptitle(name, fontsize=12)
-    text = "\n".join(_wrapped(lines))
+    text = "\n".join(part for line in lines for part in wrap(line, 150))
     figure.text(0.05, 0.155, text, fontsize=8.5, va="top", linespacing=1.35)
     figure.savefig(out)
-
-
-def _wrapped(lines: list[str]) -> list[str]:
-    from textwrap import wrap
-
-    return [part for line in lines for part in wrap(line, 150)]
