@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from sqlalchemy import ColumnElement, Select, func, select
-from sqlalchemy.orm import Session, selectinload
+from sqlalchemy.orm import Session, selectinload, undefer
 
 from analysis.files import replacing
 from analysis.manifest import KINDS
@@ -26,7 +26,7 @@ from app import parquet, recruiting
 from app.models import Link, Participant, Response, Trial, participant_code
 from app.questionnaire import screen
 from app.study import Study
-from stimuli.asking import Ask
+from stimuli.asking import ADAPTIVE, Ask
 from stimuli.manifest import NAME as MANIFEST
 from stimuli.study import FRAMING
 
@@ -228,11 +228,12 @@ COLUMNS = (
     Column(
         "seed",
         "text",
-        "study seed/list number",
+        "study seed/list number, or study seed/adaptive number hash",
         (
             "What pairs, order and sides were drawn from: the seed of the study and the number of "
-            "the list; without the word list, drawn before lists were dealt, by the participant's "
-            "number"
+            "the list; of an adaptive design the number of the participant and the beginning of "
+            "the hash of what the pairs were chosen from (assignments.jsonl); without a word, "
+            "drawn before lists were dealt, by the participant's number"
         ),
         lambda r: r.trial.seed,
     ),
@@ -590,6 +591,8 @@ def write_zip(file: BinaryIO, session: Session, study: Study, *, simulated: bool
         "manifest.json": [(study.directory / MANIFEST).read_text("utf-8")],
         "counts.json": [json.dumps({"responses": count(session), "simulated": simulated}) + "\n"],
     }
+    if study.definition.assignment.design == ADAPTIVE:
+        parts["assignments.jsonl"] = assignments_jsonl(session, study)
     if parquet.available():
         parts["responses.parquet"] = responses_parquet(session, study, simulated=simulated)
     sums = []
@@ -603,6 +606,18 @@ def write_zip(file: BinaryIO, session: Session, study: Study, *, simulated: bool
                     digest.update(data)
             sums.append(f"{digest.hexdigest()}  {name}\n")
         archive.writestr("SHA256SUMS", "".join(sums))
+
+
+def assignments_jsonl(session: Session, study: Study) -> Iterator[str]:
+    """assignments.jsonl: of each participant of an adaptive design what the pairs were chosen from
+    (`stimuli.design.adaptive_trials`): with the seed it gives the same list again.
+    """
+    query = select(Participant).where(Participant.design_state.is_not(None))
+    query = query.options(undefer(Participant.design_state)).order_by(Participant.id)
+    for person in session.scalars(query.execution_options(yield_per=CHUNK_ROWS)):
+        row = {"participant": person.code, "number": person.id, "seed": study.seed}
+        row["state"] = json.loads(person.design_state)
+        yield json.dumps(row) + "\n"
 
 
 def pilot_csv(session: Session, study: Study, *, simulated: bool) -> Iterator[str]:

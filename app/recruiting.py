@@ -125,7 +125,11 @@ def finished_or_at_it(record: StudyRecord):
     SQL condition.
     """
     since = now() - timedelta(minutes=record.reservation_minutes)
-    last = select(func.max(Response.answered_at)).where(Response.participant_id == Participant.id)
+    last = (
+        select(func.max(Response.answered_at))
+        .where(Response.participant_id == Participant.id)
+        .correlate(Participant)
+    )
     return or_(
         Participant.completed_at.is_not(None),
         Participant.consented_at > since,

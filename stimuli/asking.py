@@ -29,18 +29,55 @@ def read_participants(table: Table) -> Participants:
     return participants
 
 
+#: How pairs come to people: dealt evenly (`stimuli.design`), or those that tell most
+#: (`stimuli.adaptive`).
+DEALT, ADAPTIVE = "dealt", "adaptive"
+
+
 @dataclass(frozen=True)
 class Assignment:
-    """pairs: how many of the study's pairs a participant is asked, 0 for all; which ones is dealt
-    evenly (`stimuli.design`).
+    """Which of the study's pairs a participant is asked.
+
+    pairs       how many, 0 for all
+    design      `DEALT` or `ADAPTIVE`
+    least_share of an adaptive design: pairs that were asked less than this share of their mean come
+                first, 0 to 1
+    beside      of an adaptive design: the share of people who are dealt theirs, 0 to 1
     """
 
     pairs: int = 0
+    design: str = DEALT
+    least_share: float = 0.5
+    beside: float = 0.0
+
+    def record(self) -> dict:
+        return {
+            key: value
+            for key, value in vars(self).items()
+            if key == "pairs" or self.design == ADAPTIVE
+        }
 
 
 def read_assignment(table: Table, pairs: int) -> Assignment:
     """The table `[assignment]` of a study of so many pairs, checked."""
-    assignment = Assignment(table.number("pairs", 0, pairs, default=0))
+    some = table.number("pairs", 0, pairs, default=0)
+    design = table.one_of("design", (DEALT, ADAPTIVE), default=DEALT)
+    adaptive = design == ADAPTIVE
+    if adaptive and some in (0, pairs):
+        raise table.fault("pairs", some, f"from 1 to {pairs - 1}: who is asked all has no choice")
+
+    def part(key: str) -> float:
+        expected = "a number from 0 to 1" if adaptive else f'nothing, unless design = "{ADAPTIVE}"'
+        value = table.take(
+            key,
+            (int, float),
+            expected,
+            lambda value: adaptive and type(value) is not bool and 0 <= value <= 1,
+            default=getattr(Assignment, key),
+        )
+        return float(value)
+
+    assignment = Assignment(some, design, part("least_share"), part("beside"))
     table.end()
     return assignment
 

@@ -18,10 +18,11 @@ from math import gcd
 
 import numpy as np
 
-from stimuli.asking import Quality, Trap
+from stimuli.adaptive import State, chosen
+from stimuli.asking import Assignment, Quality, Trap
 
 #: What a stream of random words is for; the first is followed by the list's number.
-_QUALITY, _DEAL, _LIST, _TRAPS, _BIAS = 0, 1, 2, 3, 4
+_QUALITY, _DEAL, _LIST, _TRAPS, _BIAS, _ADAPTIVE, _BESIDE = range(7)
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,44 @@ def trials(
     main = [Trial(place, *one) for place, one in enumerate(sided, start=1)]
     if not quality or not quality.questions:
         return main
+    return _completed(main, cells, techniques, quality, seed, number)
+
+
+def adaptive_trials(
+    cells: Sequence[str],
+    techniques: Sequence[str],
+    seed: int,
+    number: int,
+    quality: Quality | None,
+    assignment: Assignment,
+    state: State,
+) -> list[Trial]:
+    """The trials of one person under an adaptive design: `number`, the person's, and `state`, what
+    was asked and answered before, give the same ones again.
+    """
+    share = _shares(seed, _ADAPTIVE, number)
+    pairs = chosen(state, cells, techniques, assignment.pairs, assignment.least_share, share)
+    main = [Trial(place, *one) for place, one in enumerate(_shuffled(pairs, share), start=1)]
+    if not quality or not quality.questions:
+        return main
+    return _completed(main, cells, techniques, quality, seed, number)
+
+
+def dealt_beside(seed: int, number: int, beside: float) -> bool:
+    """Whether a person of an adaptive design is one of those who are dealt their pairs."""
+    return _shares(seed, _BESIDE, number)() < beside
+
+
+def _completed(
+    main: list[Trial],
+    cells: Sequence[str],
+    techniques: Sequence[str],
+    quality: Quality,
+    seed: int,
+    number: int,
+) -> list[Trial]:
+    """With the questions that tell how well people look."""
+    couple, mirrored = divmod(number - 1, 2)
     traps = _sided_traps(quality.traps, _shares(seed, _TRAPS, couple), mirrored)
     images = _against_itself(cells, techniques, seed, (number - 1) * quality.bias, quality.bias)
     return _with_quality(main, traps, images, quality, _shares(seed, _QUALITY, number))

@@ -391,7 +391,7 @@ class Study:
             "viewer": self.viewer.record(),
             **({"recruiting": self.recruiting.record()} if self.recruiting != Recruiting() else {}),
             "participants": vars(self.participants),
-            "assignment": vars(self.assignment),
+            "assignment": self.assignment.record(),
             "quality": self.quality.record({cell.name: cell.levels for cell in self.cells}),
             "before": [ask.record() for ask in self.before],
             "after": [ask.record() for ask in self.after],

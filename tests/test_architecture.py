@@ -21,6 +21,7 @@ MAY_IMPORT = {
     },
     "app": {
         "analysis",
+        "stimuli.adaptive",
         "stimuli.design",
         "stimuli.errors",
         "stimuli.manifest",

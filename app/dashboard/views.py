@@ -135,6 +135,16 @@ def responses_parquet():
     return response
 
 
+@blueprint.get("/assignments.jsonl")
+def assignments_jsonl():
+    """What the pairs of an adaptive design were chosen from."""
+    with database().read() as db:
+        body = "".join(export.assignments_jsonl(db, study()))
+    response = download(body, "assignments.jsonl")
+    response.mimetype = "application/jsonl"
+    return response
+
+
 @blueprint.get("/export.zip")
 def export_zip():
     """Tables, codebook and manifest of one moment, with hashes and the number of answers."""

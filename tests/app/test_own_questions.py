@@ -179,7 +179,7 @@ STORED = {
 #: Numbers and codes that the server makes, what a researcher notes, what a recruiter's link says.
 OURS = (
     "id participant_id trial_id visit completion_code withdrawal_key resume_code pilot recruit "
-    "recruit_id list_number "
+    "recruit_id list_number design_state "
     "screen excluded_at excluded_because consent_sha256"
 )
 OWN = "name value"  # of the study's own questions

@@ -42,6 +42,7 @@ CLOSED = [
         "participants.csv",
         "responses.jsonl",
         "responses.parquet",
+        "assignments.jsonl",
         "export.zip",
         "participants",
         "participants/P0001",

@@ -1,0 +1,109 @@
+"""Adaptive pairs: what they are expected to tell, and the bounds within which they are chosen."""
+
+import json
+from collections import Counter
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from stimuli.adaptive import PRIOR, information, nothing, posterior, written
+from stimuli.asking import ADAPTIVE, Assignment, Quality, Trap
+from stimuli.design import adaptive_trials
+
+CELLS, ITEMS = ("near", "far"), ("a", "b", "c", "d", "e")
+PLACE = {pair: k for k, pair in enumerate(combinations(ITEMS, 2))}
+
+
+def taken_part(state, trials, worth, rng):
+    """The state after somebody answered by Bradley and Terry's model."""
+    after = json.loads(json.dumps(state))
+    for trial in trials:
+        if trial.kind != "main":
+            continue
+        first = (trial.left, trial.right) in PLACE
+        pair = (trial.left, trial.right) if first else (trial.right, trial.left)
+        row = after[trial.cell][PLACE[pair]]
+        row[0 if first else 1] += 1
+        d = worth[ITEMS.index(pair[0])] - worth[ITEMS.index(pair[1])]
+        row[2 if rng.random() < 1 / (1 + np.exp(-d)) else 3] += 1
+    return after
+
+
+def test_the_posterior_is_the_mode_and_its_curvature():
+    """Of two items by a grid; and of a thousand answers it is the logarithm of the odds."""
+    rows = [[2, 2, 3, 0, 1]]  # 3.5 wins against 0.5
+    worth, covariance = posterior(rows, 2)
+    d = np.linspace(-6, 6, 200_001)
+    # two worths of variance PRIOR^2 are as far apart as sqrt(2) PRIOR
+    log = -3.5 * np.log1p(np.exp(-d)) - 0.5 * np.log1p(np.exp(d)) - d**2 / (4 * PRIOR**2)
+    assert worth[0] - worth[1] == pytest.approx(d[log.argmax()], abs=1e-4)
+    variance = covariance[0, 0] + covariance[1, 1] - 2 * covariance[0, 1]
+    at = log.argmax()
+    curvature = -(log[at + 100] - 2 * log[at] + log[at - 100]) / (d[100] - d[0]) ** 2
+    assert variance == pytest.approx(1 / curvature, rel=1e-3)
+    worth, _ = posterior([[0, 0, 75_000, 25_000, 0]], 2)
+    assert worth[0] - worth[1] == pytest.approx(np.log(3), abs=1e-3)
+
+
+def test_information_is_that_of_an_integral_and_of_a_sure_thing_none():
+    mean, variance = np.array([0.0, 0.7, 0.0, 12.0]), np.array([1.0, 2.5, 1e-12, 0.1])
+    d = np.linspace(-15, 15, 40_001)
+    for got, m, v in zip(information(mean, variance)[:2], mean, variance):
+        density = np.exp(-((d - m) ** 2) / (2 * v)) / np.sqrt(2 * np.pi * v)
+        p = 1 / (1 + np.exp(-d))
+        entropy = lambda q: -q * np.log(q) - (1 - q) * np.log(1 - q)
+        expected = entropy(np.trapezoid(p * density, d)) - np.trapezoid(entropy(p) * density, d)
+        assert got == pytest.approx(expected, abs=1e-5)
+    assert np.abs(information(mean, variance)[2:]).max() < 1e-4  # known already; foreseen
+
+
+def test_lists_keep_the_bounds_and_are_drawn_again_from_what_they_were_chosen_from():
+    """60 people, worths far apart: no pair twice a person, cells even to one, each pair on each
+    side as often to one, none left behind, and near pairs more often than far ones.
+    """
+    quality = Quality(repeats=1, bias=1, traps=(Trap("near", "a", "e"),))
+    assignment = Assignment(7, ADAPTIVE, least_share=0.5)
+    worth, rng = np.array([2.0, 1.9, 0.0, -1.9, -2.0]), np.random.default_rng(1)
+    state, firsts = nothing(CELLS, ITEMS), set()
+    for number in range(1, 61):
+        trials = adaptive_trials(CELLS, ITEMS, 9, number, quality, assignment, state)
+        again = adaptive_trials(
+            CELLS, ITEMS, 9, number, quality, assignment, json.loads(written(state))
+        )
+        assert trials == again
+        main = [t for t in trials if t.kind == "main"]
+        kinds = Counter(t.kind for t in trials)
+        assert kinds == {"main": 7, "repeat": 1, "bias": 1, "trap": 1}
+        assert len({(t.cell, frozenset((t.left, t.right))) for t in main}) == 7
+        assert sorted(Counter(t.cell for t in main).values()) == [3, 4]
+        firsts.add((main[0].cell, main[0].left, main[0].right))
+        state = taken_part(state, trials, worth, rng)
+        for cell in CELLS:
+            rows = np.array(state[cell])
+            assert np.abs(rows[:, 0] - rows[:, 1]).max() <= 1
+            counts = rows[:, :2].sum(axis=1)
+            assert counts.min() >= np.floor(0.5 * counts.mean()) - 1
+    totals = [np.array(state[cell])[:, :2].sum() for cell in CELLS]
+    assert abs(totals[0] - totals[1]) <= 1 and len(firsts) > 10
+    for cell in CELLS:
+        near, other, far = (sum(state[cell][PLACE[tuple(pair)]][:2]) for pair in ("ab", "de", "ae"))
+        assert min(near, other) > 1.5 * far
+        sides = Counter()
+        for (a, b), row in zip(PLACE, state[cell]):
+            sides[a] += row[0] - row[1]
+            sides[b] += row[1] - row[0]
+        assert max(map(abs, sides.values())) <= 4  # every technique as often on each side
+
+
+def test_the_share_of_the_mean_is_what_bounds_lopsided_counts():
+    worth, shares = np.array([3.0, 2.9, 0.0, -2.9, -3.0]), {}
+    for least in (0.0, 1.0):
+        state, rng = nothing(CELLS, ITEMS), np.random.default_rng(2)
+        for number in range(1, 41):
+            assignment = Assignment(6, ADAPTIVE, least_share=least)
+            trials = adaptive_trials(CELLS, ITEMS, 3, number, None, assignment, state)
+            state = taken_part(state, trials, worth, rng)
+        counts = np.array(state["near"])[:, :2].sum(axis=1)
+        shares[least] = counts.min() / counts.max()
+    assert shares[0.0] < 0.4 < 0.6 < shares[1.0]
