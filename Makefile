@@ -5,12 +5,13 @@
 # make test-cluster   install Dask's distributed too, run the tests of builds by several processes
 # make test-parquet   install pyarrow too, run the tests of responses.parquet
 # make test-postgres  install PostgreSQL and its driver, run the tests of the questionnaire over it
+# make test-visibility  install ColorVideoVDP and torch too, run the tests of predicted visibility
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
 # make translations   collect the messages of the pages into app/translations/*/*.po and compile them
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-bayes test-cluster test-parquet test-postgres demo bench translations clean
+.PHONY: help setup test test-bayes test-cluster test-parquet test-postgres test-visibility demo bench translations clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -55,6 +56,12 @@ test-postgres:
 	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
 		--require-hashes --only-binary :all: -r requirements-postgres.lock
 	tools/with-postgres .venv/bin/python -m pytest tests/app --ignore tests/app/test_browser.py
+
+test-visibility:
+	@tools/setup test
+	.venv/bin/python -m pip --quiet --disable-pip-version-check install --no-deps \
+		--require-hashes --only-binary :all: -r requirements-visibility.lock
+	.venv/bin/python -m pytest tests/visibility tests/stimuli/test_visibility.py
 
 demo: setup
 	$(SUBDERMAL) build stimuli/studies/thesis.toml --out $(OUT)

@@ -25,6 +25,8 @@ MEASURES = {
     "dssim": "DSSIM to the reference",
     "flip": "FLIP to the reference",
 }
+#: What predicts which pairs can be told apart, `subdermal experiment visibility`.
+VISIBILITY = "visibility"
 #: Labels of the levels 1 to 5 of the self-rating, where the study names none.
 FAMILIARITY = ("1, no familiarity", "2", "3", "4", "5, high familiarity")
 #: What a question is for. `main` counts; `repeat` and `swapped` ask a main pair again, on the same
@@ -86,6 +88,32 @@ class ManifestFile:
             if region is not None:
                 return read_region(where, region)
         return WHOLE
+
+    @property
+    def visibility(self) -> dict:
+        """What was predicted of each pair, empty where nothing was: `metric`, `version`, `display`
+        and `pairs`, those alone whose images are still the same.
+        """
+        value = self.value.get(VISIBILITY)
+        if value is None:
+            return {}
+        where = f"{self.path}: {VISIBILITY}"
+        if not isinstance(value, dict) or not isinstance(value.get("pairs"), list):
+            raise InputError(f"{where} is {value!r:.60}, expected a table with pairs")
+        kept = {image.get("sha256") for image in self.images}
+        pairs = []
+        for place, pair in enumerate(value["pairs"]):
+            names = ("cell", "a", "b", "sha256_a", "sha256_b")
+            if not isinstance(pair, dict) or not all(isinstance(pair.get(k), str) for k in names):
+                raise InputError(
+                    f"{where}.pairs[{place}] is {pair!r:.60}, expected {', '.join(names)} and jod"
+                )
+            jod = pair.get("jod")
+            if isinstance(jod, bool) or not isinstance(jod, int | float) or not jod <= 10.001:
+                raise InputError(f"{where}.pairs[{place}].jod is {jod!r}, expected at most 10")
+            if {pair["sha256_a"], pair["sha256_b"]} <= kept:
+                pairs.append(pair)
+        return {**value, "pairs": pairs}
 
     def measures(self, place: int) -> dict[str, float]:
         """What is measured of the image at a place; `null` and nothing are the same."""

@@ -198,22 +198,23 @@ def dssim_map(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return (1 - similarity) / 2
 
 
-def flip(x: np.ndarray, y: np.ndarray) -> float:
+def flip(x: np.ndarray, y: np.ndarray, pixels_per_degree: float = 67.0) -> float:
     """Mean FLIP of two images (H, W, 3) in [0, 1], sRGB: 0 for the same one, at most 1; x is the
     reference.
 
     Andersson et al. 2020, "FLIP: a difference evaluator for alternating images",
-    doi:10.1145/3406183, by its authors' package, at their 67 pixels a degree.
+    doi:10.1145/3406183, by its authors' package, at their 67 pixels a degree unless told.
     """
-    return float(flip_map(x, y).mean())
+    return float(flip_map(x, y, pixels_per_degree).mean())
 
 
-def flip_map(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def flip_map(x: np.ndarray, y: np.ndarray, pixels_per_degree: float = 67.0) -> np.ndarray:
     """FLIP of each pixel (H, W), see `flip`."""
     import flip_evaluator
 
     both = (np.ascontiguousarray(image, np.float32) for image in (x, y))
-    return flip_evaluator.evaluate(*both, "LDR", applyMagma=False)[0][..., 0]
+    own = {"ppd": pixels_per_degree}
+    return flip_evaluator.evaluate(*both, "LDR", applyMagma=False, parameters=own)[0][..., 0]
 
 
 #: Distances to the reference that are computed from the images, and where in them.

@@ -27,6 +27,7 @@ from analysis import (
     remarks,
     shown,
     tallies,
+    visibility,
     worth_figures,
 )
 from analysis.ahp import Comparison, Priorities
@@ -60,13 +61,15 @@ def report_responses(
     options: Options | None = None,
     declared: str = UNDECLARED,
     measured: Measured | None = None,
+    visible: pd.DataFrame | None = None,
     progress: Callable[[Iterable], Iterable] = lambda steps: steps,
 ) -> dict[str, bytes]:
     """All files of the analysis of a response table: path inside the output folder -> content.
 
     pair: the two techniques of the box plot; without it golubev and golubev_plus where both are
     present, else the first two. options: the choices of the analysis, and `declared`, where they
-    come from; measured: what the manifest holds of cost and fidelity. progress wraps the list of
+    come from; measured: what the manifest holds of cost and fidelity; visible: what was predicted
+    of each pair (`visibility.read_visibility`). progress wraps the list of
     tables, as tqdm does.
     """
     options = options or Options()
@@ -107,6 +110,10 @@ def report_responses(
         beside = objective.against_worth(measured.table, results.tables["worths"])
         correlated = objective.correlations(beside)
         tables |= {"objective": beside, "objective_correlations": correlated}
+    seen = None
+    if visible is not None and len(visible):
+        seen = visibility.beside_answers(visible, tables["distributions"], results.tables["worths"])
+        tables["visibility"] = seen
     if responses.simulated:
         tables = {name: table.assign(simulated=1) for name, table in tables.items()}
 
@@ -120,6 +127,10 @@ def report_responses(
                 rows, measure, about, codebook, simulated, 100 * options.level
             )
         cost_words = objective.sentences(beside, correlated, measured.notes, codebook)
+    seen_words = []
+    if seen is not None and len(seen):
+        pictures.append(worth_figures.draw_visibility(seen, codebook, simulated))
+        seen_words = visibility.sentences(seen, codebook, visible.attrs.get("metric", "A metric"))
     pictures += figures.draw_responses(responses, priorities, pair, slugs)
     read = shown.all_shown(results.tables, codebook, options)
     read |= {one.name: one for one in shown.not_counted(responses) if one.rows}
@@ -140,6 +151,7 @@ def report_responses(
         ("What cannot be concluded", concluded.cannot),
         ("What was counted", [*counted, *_not_drawn(responses)]),
         *([("Cost and fidelity beside worth", cost_words)] if cost_words else []),
+        *([("Predicted visibility beside answers", seen_words)] if seen_words else []),
     ]
     text = methods.paragraphs(responses, options, declared)
     used = "".join(words for _, words in text)

@@ -711,6 +711,53 @@ def _objective(framings: list[str], table: pd.DataFrame, about: str, codebook: C
     return figure
 
 
+def draw_visibility(table: pd.DataFrame, codebook: Codebook, simulated: bool = False) -> Picture:
+    """Predicted visibility of each pair against the share of answers that saw a difference.
+
+    table: see `visibility.beside_answers`.
+    """
+    return figures._picture(
+        "visibility",
+        "Predicted visibility beside answers",
+        "Each point is a pair: how far apart its images are predicted to look as they were shown, "
+        "and which share of its answers was not 'no difference'. Left of the line, within 0.1 JOD, "
+        "53 of 100 forced choices tell them apart. A prediction of visibility, not of realism.",
+        "; ".join(
+            f"{framing_label(codebook, row.framing)}, {codebook.label(row.technique)} and "
+            f"{codebook.label(row.opponent)}: {row.predicted_jod:.2f} JOD, "
+            f"{100 * row.noticed:.0f} % saw a difference"
+            for row in table.itertuples()
+        ),
+        _visibility,
+        table,
+        codebook,
+        simulated=simulated,
+    )
+
+
+def _visibility(table: pd.DataFrame, codebook: Codebook) -> Figure:
+    figure, (ax,) = figures._panels(1, 1, 3.0)
+    colours, markers = (BLUE, ORANGE, GREEN, VERMILLION, SKY), "os^Dv"
+    for k, framing in enumerate(dict.fromkeys(table.framing)):
+        here = table[table.framing == framing]
+        ax.plot(
+            here.predicted_jod.clip(lower=1e-3),
+            100 * here.noticed,
+            markers[k % 5],
+            color=colours[k % 5],
+            markersize=5,
+            label=figures._cut(framing_label(codebook, framing), 24),
+        )
+    ax.axvline(0.1, color="#888888", linewidth=0.8, zorder=0)
+    ax.set_xscale("log")
+    ax.set_ylim(-3, 103)
+    ax.set_xlabel("predicted, JOD apart")
+    ax.set_ylabel("answers that saw a difference, %")
+    ax.legend(loc="best")
+    ax.grid()
+    return figure
+
+
 def draw_power(
     curves: pd.DataFrame, plan: object, names: Mapping[tuple[str, str], str], codebook: Codebook
 ) -> Picture:
@@ -721,7 +768,7 @@ def draw_power(
     """
     return figures._picture(
         "power",
-        f"How many people find {plan.difference:g} JOD, or exclude {plan.margin:.3g} points",
+        f"How many people find {plan.apart} JOD, or exclude {plan.margin:.3g} points",
         "Share of simulated studies that reach the goal; the dashed line is the wanted "
         f"power, {plan.power:g}; bands are 95 % intervals of the simulation, dots the closed form "
         "where there is one."
@@ -761,7 +808,7 @@ def _power(curves: pd.DataFrame, plan: object, names: Mapping[tuple[str, str], s
     figure = Figure(figsize=(WIDTH_IN, 1.75 * len(goals) + 0.75), layout="constrained")
     axes = figure.subplots(len(goals), len(designs), squeeze=False, sharex=True, sharey=True)
     aims = {
-        "find": f"find {plan.difference:g} JOD",
+        "find": f"find {plan.apart} JOD",
         "exclude": f"exclude {plan.margin:.3g} points",
     }
     for row, goal in enumerate(goals):

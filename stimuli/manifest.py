@@ -8,7 +8,15 @@ import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from analysis.manifest import FORMATS, NAME, WHOLE, ManifestFile, open_manifest, region_box
+from analysis.manifest import (
+    FORMATS,
+    NAME,
+    VISIBILITY,
+    WHOLE,
+    ManifestFile,
+    open_manifest,
+    region_box,
+)
 from stimuli.errors import InputError
 from stimuli.study import FRAMING, Cell, Study, read_study
 from stimuli.table import Table
@@ -113,6 +121,8 @@ def load_manifest(directory: str | Path, verify: bool = True) -> Manifest:
     for licence in licences:
         for key in ("what", "licence", "source"):
             licence.text(key)
+    if file.visibility:  # checked there
+        table.take(VISIBILITY, dict)
     table.end()
     _one_each(study, images, entries, table)
     if verify:

@@ -13,9 +13,9 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[1]
 
 
-EXTRAS = ("bayes", "cluster", "parquet", "postgres")
+EXTRAS = ("bayes", "cluster", "parquet", "postgres", "visibility")
 LOCKS = ("requirements.lock", *(f"requirements-{extra}.lock" for extra in EXTRAS))
-MORE_THAN = dict(zip(LOCKS, (40, 4, 12, 0, 2)))
+MORE_THAN = dict(zip(LOCKS, (40, 4, 12, 0, 2, 20)))
 
 
 def read(name):

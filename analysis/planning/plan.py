@@ -29,6 +29,7 @@ class Plan:
 
     techniques  their names; pair: the two of them that it is about
     difference  JOD between the pair, to find
+    differences framing -> the same, where it is not the same at all
     worths      framing -> technique -> assumed worth in JOD; `ANY` for all framings alike
     framings    the framings (or cells) of the study, whose pairs Holm's correction guards together
     answering   how people answer
@@ -49,6 +50,7 @@ class Plan:
     most: int = 400
     studies: int = 1000
     seed: int = 1
+    differences: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         pairs = len(self.techniques) * (len(self.techniques) - 1) // 2
@@ -68,6 +70,10 @@ class Plan:
             )
         checks = (
             ("difference", self.difference, 0.01 <= self.difference <= 10, "JOD from 0.01 to 10"),
+            *(
+                (f"the difference at {name}", value, 0.0 <= value <= 10, "JOD from 0 to 10")
+                for name, value in self.differences.items()
+            ),
             (
                 "answers_each",
                 self.answers_each,
@@ -153,7 +159,19 @@ class Plan:
     @property
     def reported(self) -> tuple[str, ...]:
         """The framings that results are told for: all as one, where their worths are the same."""
-        return self.framings if set(self.framings) & set(self.worths) else (ANY,)
+        own = {*self.worths, *self.differences}
+        return self.framings if set(self.framings) & own else (ANY,)
+
+    @property
+    def apart(self) -> str:
+        """JOD between the pair, in words: one number, or the range over framings."""
+        every = [self.to_find(framing) for framing in self.framings]
+        low, high = min(every), max(every)
+        return f"{low:g}" if low == high else f"{low:.2g} to {high:.2g}"
+
+    def to_find(self, framing: str) -> float:
+        """JOD between the pair at a framing."""
+        return self.differences.get(framing, self.difference)
 
     def truth(self, framing: str, difference: float) -> np.ndarray:
         """The worths at a framing with the pair set `difference` apart about its middle, in JOD,

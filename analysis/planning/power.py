@@ -54,9 +54,9 @@ def plan_table(
     for step, design in enumerate(progress(list(designs))):
         each = len(plan.pairs) if design == "full" else plan.each
         by_truth = {
-            "find": plan.difference,
-            "exclude": 0.0,
-            "margin": at_margin,
+            "find": plan.to_find,
+            "exclude": lambda _framing: 0.0,
+            "margin": lambda _framing: at_margin,
         }
         studies = {
             truth: Studies(
@@ -77,7 +77,9 @@ def plan_table(
                         powers = [true.at(people, place) for people in grid]
                         for people, power in zip(grid, powers, strict=True):
                             bounds = wilson(power, plan.studies)
-                            closed = closed_form(plan, design, goal, test, correction, people)
+                            closed = closed_form(
+                                plan, design, goal, test, correction, people, framing
+                            )
                             curves.append((*head, people, power, *bounds, closed))
                         count = _needed(plan, true, place, grid, powers)
                         at = plan.most if count is None else count
@@ -116,7 +118,13 @@ def people_grid(most: int) -> list[int]:
 
 
 def closed_form(
-    plan: Plan, design: str, goal: str, test: str, correction: str, people: int
+    plan: Plan,
+    design: str,
+    goal: str,
+    test: str,
+    correction: str,
+    people: int,
+    framing: str = ANY,
 ) -> float:
     """The power of the full design and one uncorrected test from a formula, NaN where there is
     none: the sign test's is exact; equivalence by the noncentral t, integrated over the standard
@@ -127,7 +135,7 @@ def closed_form(
     if design != "full" or test != "declared" or correction != "none":
         return math.nan
     if goal == "find" and plan.options.test == "sign":
-        shares = model.shares(plan.difference)
+        shares = model.shares(plan.to_find(framing))
         return sign_power(shares[3] + shares[4], shares[0] + shares[1], people, plan.alpha)
     if goal == "exclude":
         return tost_power(0.0, plan.margin / model.sd(0.0), people, plan.alpha)

@@ -10,6 +10,7 @@ arXiv:2004.05691).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from scipy import stats
@@ -42,14 +43,20 @@ class Studies:
     they were asked.
     """
 
-    def __init__(self, plan: Plan, design: str, difference: float, rng: np.random.Generator):
+    def __init__(
+        self,
+        plan: Plan,
+        design: str,
+        difference: Callable[[str], float],
+        rng: np.random.Generator,
+    ):
         self.plan = plan
         shape = (plan.studies, plan.most, len(plan.framings), len(plan.pairs))
         self.answers = np.empty(shape, np.int8)
         self.asked = np.ones(shape, bool)
         step = max(1, CHUNK // (plan.most * len(plan.pairs)))
         for place, framing in enumerate(plan.framings):
-            worths = plan.truth(framing, difference)
+            worths = plan.truth(framing, difference(framing))
             for first in range(0, plan.studies, step):
                 part = slice(first, min(first + step, plan.studies))
                 drawn = answers(plan, worths, part.stop - first, rng)

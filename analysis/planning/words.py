@@ -75,7 +75,7 @@ def _needs(plan: Plan, needed: pd.DataFrame, codebook: Codebook) -> list[str]:
         place = "" if where == ANY else f"{codebook.framing_label(where)}, "
         people = rows.set_index(["test", "correction"]).people
         aim = (
-            f"to find {plan.difference:g} JOD between {a} and {b} by the declared {test}"
+            f"to find {plan.to_find(where):g} JOD between {a} and {b} by the declared {test}"
             if goal == "find"
             else f"to put {a} and {b}, which do not differ, within {plan.margin:.3g} points by the "
             "declared equivalence test"
@@ -188,11 +188,11 @@ def _page(
 def _assumptions(plan: Plan, codebook: Codebook, source: str) -> list[str]:
     model = plan.answering
     lines = [
-        f"- Worths in JOD, {source}; the pair set {plan.difference:g} apart about its middle, or 0 "
+        f"- Worths in JOD, {source}; the pair set {plan.apart} apart about its middle, or 0 "
         "apart to exclude:"
     ]
     for framing in plan.reported:
-        values = zip(plan.techniques, plan.truth(framing, plan.difference), strict=True)
+        values = zip(plan.techniques, plan.truth(framing, plan.to_find(framing)), strict=True)
         worths = ", ".join(f"{codebook.label(name)} {worth:z.2f}" for name, worth in values)
         where = "every framing" if framing == ANY else codebook.framing_label(framing)
         lines.append(f"  - {where}: {worths}")

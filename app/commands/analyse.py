@@ -125,6 +125,7 @@ def command(
     from analysis.codebook import FRAMING
     from analysis.objective import read_measures
     from analysis.report import report_matrices, report_responses, write_files
+    from analysis.visibility import read_visibility
 
     if (responses is None) == (matrices is None):
         raise click.UsageError("expected either RESPONSES or --matrices FILE.toml")
@@ -153,6 +154,7 @@ def command(
         chosen,
         _source(declared, choices),
         read_measures(manifest, reference, factor or FRAMING) if manifest else None,
+        read_visibility(manifest, factor or FRAMING) if manifest else None,
         _progress,
     )
     write_files(files, out)

@@ -238,3 +238,111 @@ def _chapter(scene, patches, framings, parts, options: dict, out: Path) -> None:
         click.echo(line)
     click.echo(f"{out / 'samples.csv'}: {len(rows)} rows of {len(listed)} pictures")
     click.echo(f"{out / 'figures'}: {len(files)} files")
+
+
+@command.command("visibility")
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--screen", metavar=drawing.SIZE, help="Pixels of the screen.")
+@click.option(
+    "--diagonal",
+    "diagonal_in",
+    type=click.FloatRange(1, 200),
+    metavar="INCHES",
+    help="Of the screen; without it and the like, the study's [viewer.screen].",
+)
+@click.option(
+    "--distance",
+    "distance_mm",
+    type=click.FloatRange(50, 20000),
+    metavar="MM",
+    help="Of the eyes from it.",
+)
+@click.option(
+    "--luminance", type=click.FloatRange(1, 10000), metavar="CD/M2", help="Of the screen's white."
+)
+@click.option(
+    "--ambient",
+    "ambient_lux",
+    type=click.FloatRange(0, 1e5),
+    metavar="LUX",
+    help="Light that falls on the screen.",
+)
+@click.option(
+    "--zoom",
+    type=click.IntRange(0, 16),
+    default=0,
+    show_default=True,
+    help="Screen pixels an image pixel; 0: as the page begins.",
+)
+@click.option(
+    "--crop",
+    metavar="WxH+X+Y",
+    help="This part of the images instead of the study's region of interest.",
+)
+@click.option(
+    "--write/--no-write",
+    default=True,
+    show_default=True,
+    help="Write it into the study's manifest; what is not as the page begins never is.",
+)
+@click.option(
+    "--out",
+    "-o",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for visibility.csv, .svg and .png; the study's own if not given.",
+)
+def visibility(study, screen, zoom, crop, write, out, **given) -> None:
+    """Predict which pairs of the built STUDY people can tell apart, as the page shows them.
+
+    ColorVideoVDP's JOD (10: they look the same; 1 less: three of four can tell) and FLIP, for the
+    screen of the study's [viewer.screen] or of the options. The extra `visibility` is needed.
+    """
+    import json
+
+    from tqdm import tqdm
+
+    from analysis.objective import flip
+    from app.renditions import resampled
+    from stimuli.compare import parse_crop
+    from stimuli.experiment import visibility as seen
+    from stimuli.manifest import load_manifest
+
+    folder = study.parent if study.suffix == ".json" else study
+    manifest = load_manifest(folder)
+    if screen:
+        given |= dict(zip(("width", "height"), drawing.size_of(None, None, screen), strict=True))
+    box = parse_crop(crop) if crop else None
+    asked = seen.Asked(seen.screen_of(manifest, **given), zoom, box)
+    metric = seen.ColorVideoVDP(asked.screen)
+    count = len(manifest.study.techniques)
+    total = len(manifest.study.cells) * count * (count - 1) // 2
+    predicted = seen.predict(
+        manifest,
+        asked,
+        metric,
+        lambda one, other, display: flip(one, other, display.pixels_per_degree),
+        resampled,
+    )
+    pairs = list(tqdm(predicted, total=total, unit="pair", disable=None))
+    click.echo(
+        f"{metric.name} {metric.version}, {asked.screen.width}x{asked.screen.height}, "
+        f"{asked.screen.diagonal_in:g} inches at {asked.screen.distance_mm:g} mm: "
+        f"{asked.screen.pixels_per_degree:.1f} pixels a degree"
+    )
+    click.echo(f"{'':<28}{'pair':<36}{'shown':>10}{'JOD':>8}{'apart':>8}{'FLIP x 100':>12}")
+    for pair in sorted(pairs, key=lambda one: (one.cell, one.apart)):
+        click.echo(
+            f"{pair.cell:<28}{pair.a + ' / ' + pair.b:<36}{f'{pair.width}x{pair.height}':>10}"
+            f"{pair.jod:>8.3f}{pair.apart:>8.3f}{100 * pair.flip:>12.3f}"
+        )
+    for line in seen.warnings(pairs):
+        click.echo(line, err=True)
+    labels = {one.name: one.label for one in manifest.study.techniques}
+    labels |= {cell.name: manifest.study.cell_label(cell) for cell in manifest.study.cells}
+    folder_out = out or folder
+    folder_out.mkdir(parents=True, exist_ok=True)
+    for file in seen.draw(pairs, labels, folder_out / "visibility"):
+        click.echo(f"{file}")
+    if write and not zoom and box is None:
+        seen.write(folder, json.loads(json.dumps(seen.record(pairs, metric, asked))))
+        click.echo(f"{folder / 'manifest.json'}: {len(pairs)} pairs under visibility")

@@ -28,6 +28,16 @@ from app.answers import names, numbers, written
     ),
 )
 @click.option(
+    "--visibility",
+    "predicted",
+    type=click.Path(path_type=Path),
+    metavar="STUDY",
+    help=(
+        "The built study whose predicted visibility (`subdermal experiment visibility`) is the "
+        "difference, framing by framing: as if all that can be seen were preferred."
+    ),
+)
+@click.option(
     "--pair",
     callback=names,
     metavar="A,B",
@@ -126,6 +136,7 @@ def command(
     study: Path,
     out: Path,
     difference: float | None,
+    predicted: Path | None,
     pair: tuple[str, str] | None,
     assumed: dict[str, float],
     pilot: Path | None,
@@ -201,9 +212,17 @@ def command(
         level=None if alpha is None else round(1 - alpha, 10),
         margin=margin,
     )
+    known_pair = pair or (known if set(known) <= set(techniques) else techniques[:2])
+    differences = {}
+    if predicted is not None:
+        if difference is not None:
+            raise click.UsageError("expected either --difference or --visibility")
+        differences = _predicted(predicted, known_pair, cells)
+        source += f"; the pair's difference as predicted in {predicted.name}, all of it preference"
     plan = Plan(
         techniques=techniques,
-        pair=pair or (known if set(known) <= set(techniques) else techniques[:2]),
+        pair=known_pair,
+        differences=differences,
         difference=definition.analysis.get("margin_jod", 0.5) if difference is None else difference,
         worths=table,
         answering=answering,
@@ -233,3 +252,23 @@ def command(
     if fingerprint:
         click.echo(f"sha256 of the study's [analysis]: {fingerprint}")
     click.echo(f"{out / 'power.md'}: {studies} simulated studies for each design, seed {seed}")
+
+
+def _predicted(study: Path, pair: tuple[str, str], cells: tuple[str, ...]) -> dict[str, float]:
+    """Cell -> JOD between the pair, as predicted; InputError where a cell has none."""
+    from analysis.errors import InputError
+    from analysis.manifest import open_manifest
+
+    manifest = open_manifest(study)
+    apart = {
+        one["cell"]: round(max(10 - one["jod"], 0.0), 4)
+        for one in manifest.visibility.get("pairs", [])
+        if {one["a"], one["b"]} == set(pair)
+    }
+    lacking = [cell for cell in cells if cell not in apart]
+    if lacking:
+        raise InputError(
+            f"{manifest.path}: visibility has no {' / '.join(pair)} at {', '.join(lacking)}; "
+            f"expected what `subdermal experiment visibility {study}` writes"
+        )
+    return {cell: apart[cell] for cell in cells}

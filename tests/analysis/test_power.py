@@ -40,7 +40,8 @@ PAIR = ("golubev", "golubev_plus")
 def run_of(plan, design="full", difference=None):
     """Simulated studies and all that their people would answer."""
     rng = np.random.default_rng(plan.seed)
-    run = Studies(plan, design, plan.difference if difference is None else difference, rng)
+    apart = plan.difference if difference is None else difference
+    run = Studies(plan, design, lambda _framing: apart, rng)
     return run, run.answers
 
 
