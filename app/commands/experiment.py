@@ -303,7 +303,6 @@ def visibility(study, screen, zoom, crop, write, out, **given) -> None:
 
     from analysis.objective import flip
     from app.renditions import resampled
-    from stimuli.compare import parse_crop
     from stimuli.experiment import visibility as seen
     from stimuli.manifest import load_manifest
 
@@ -311,7 +310,7 @@ def visibility(study, screen, zoom, crop, write, out, **given) -> None:
     manifest = load_manifest(folder)
     if screen:
         given |= dict(zip(("width", "height"), drawing.size_of(None, None, screen), strict=True))
-    box = parse_crop(crop) if crop else None
+    box = seen.parse_crop(crop) if crop else None
     asked = seen.Asked(seen.screen_of(manifest, **given), zoom, box)
     metric = seen.ColorVideoVDP(asked.screen)
     count = len(manifest.study.techniques)

@@ -22,6 +22,7 @@ from PIL import Image
 from analysis.files import replacing
 from analysis.manifest import NAME, VISIBILITY
 from renderer.optics.figures import pyplot, save
+from stimuli.compare import parse_crop as parse_crop
 from stimuli.errors import InputError
 from stimuli.experiment.chapter import write_csv
 from stimuli.manifest import Manifest
