@@ -13,12 +13,13 @@ from flask import Flask
 
 if TYPE_CHECKING:
     from app.researchers import Doorkeeper
+    from app.study import Study
 
 __all__ = ["create_app"]
 
 
 def create_app(
-    study_dir: str | Path,
+    study_dir: str | Path | Study,
     database_url: str | None = None,
     *,
     simulated: bool = False,
@@ -26,8 +27,10 @@ def create_app(
     trusted_hosts: Sequence[str] = (),
     metrics_token: str | None = None,
     doorkeeper: Doorkeeper | None = None,
+    root: str = "",
 ) -> Flask:
-    """Make the WSGI application of the study in `study_dir` (a folder with a manifest.json).
+    """Make the WSGI application of the study in `study_dir` (a folder with a manifest.json, or what
+    `app.study.Study` made of it).
 
     database_url: an SQLAlchemy URL; by default study.sqlite3 (or simulated.sqlite3) in the folder.
     simulated: whether the database holds simulated answers. It is recorded in the database at its
@@ -37,13 +40,15 @@ def create_app(
     trusted_hosts: names under which the server is asked; others are refused. Any where empty.
     metrics_token: who shows it may read /metrics; nobody without one.
     doorkeeper: of the accounts of the server; by default those in the study's own database.
+    root: what the study's addresses begin with where it is not alone (`app.hosting`).
     """
     from app import dashboard, language, monitoring, questionnaire, researchers, security, web
     from app.database import Database
+    from app.hosting import Hosted
     from app.simulation import views as simulation
     from app.study import Study
 
-    study = Study.open(study_dir)
+    study = study_dir if isinstance(study_dir, Study) else Study.open(study_dir)
     database = Database.open(
         database_url or study.database_url(simulated), study, simulated=simulated
     )
@@ -61,8 +66,9 @@ def create_app(
     # guesses, counted for this study in this process
     app.extensions["code_attempts"] = security.Limiter(attempts=10, window_s=300)
     app.extensions["doorkeeper"] = doorkeeper or researchers.Doorkeeper(database)
+    app.extensions["hosted"] = (Hosted(study.name, root, app, None),)  # alone, so far
     app.config.update(HOSTS=tuple(trusted_hosts), METRICS_TOKEN=metrics_token)
-    security.init(app)
+    security.init(app, root)
     web.init(app)
     language.init(app)
     app.register_blueprint(monitoring.blueprint)

@@ -33,7 +33,7 @@ from app.accounts import Researcher
 from app.database import Database
 from app.models import Account
 from app.security import Limiter
-from app.web import database, wants_json
+from app.web import database, hosted, wants_json
 
 COOKIE = "subdermal_researcher"
 #: Names and passwords tried from one address within `WINDOW_S`; further ones wait in line.
@@ -143,7 +143,7 @@ def current() -> Researcher | None:
 
 def of_page() -> dict:
     """For the templates of pages for researchers."""
-    return {"researcher": current()}
+    return {"researcher": current(), "several": len(hosted()) > 1}
 
 
 def is_owner() -> bool:
@@ -228,7 +228,9 @@ def login():
 
 def _wanted() -> str:
     """The page from which somebody was sent to sign in, one of this study's own."""
-    return request.script_root + session.pop("wanted", "/dashboard/")
+    otherwise = url_for("dashboard.studies" if len(hosted()) > 1 else "dashboard.index")
+    wanted = session.pop("wanted", None)
+    return request.script_root + wanted if wanted else otherwise
 
 
 def _set_cookie(response: Response, token: str) -> None:

@@ -102,12 +102,15 @@ class Limiter:
             self._times.pop(key or "", None)
 
 
-def init(app: Flask) -> None:
+def init(app: Flask, root: str) -> None:
+    """root: what the addresses of the study begin with; cookies are for these alone."""
     record = app.extensions["database"].record()
+    kind = "" if record.kind == "real" else f"_{record.kind}"
     app.config.update(
         SECRET_KEY=record.secret_key,
         STUDY_KIND=record.kind,
-        SESSION_COOKIE_NAME="subdermal" if record.kind == "real" else f"subdermal_{record.kind}",
+        SESSION_COOKIE_NAME=f"subdermal{kind}{root.replace('/', '_')}",
+        SESSION_COOKIE_PATH=root + ("/simulated" if root and kind else "") or "/",
         SESSION_COOKIE_HTTPONLY=True,
         SESSION_COOKIE_SAMESITE="Lax",
         PERMANENT_SESSION_LIFETIME=COOKIE_LIFETIME,

@@ -5,7 +5,7 @@ friendly error pages.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
-from typing import NoReturn, TypeVar
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from flask import (
     Blueprint,
@@ -27,6 +27,9 @@ from app import renditions
 from app.database import Database
 from app.study import Study, box_name
 from stimuli.manifest import Image
+
+if TYPE_CHECKING:
+    from app.hosting import Hosted
 
 T = TypeVar("T")
 
@@ -52,6 +55,11 @@ def study() -> Study:
 def database() -> Database:
     """The database of the running application."""
     return current_app.extensions["database"]
+
+
+def hosted() -> tuple[Hosted, ...]:
+    """The studies of the running server, this one among them."""
+    return current_app.extensions["hosted"]
 
 
 def simulated() -> bool:

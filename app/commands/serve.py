@@ -1,10 +1,19 @@
-"""`subdermal serve`: the questionnaire and the dashboard of a study folder."""
+"""`subdermal serve`: the questionnaire and the dashboard of a study, or of several."""
+
+from __future__ import annotations
 
 import os
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from app.hosting import Hosted
+
+#: What is served, also in a file.
+STUDIES = "studies"
 
 
 def _read_config(ctx: click.Context, parameter: click.Parameter, value: Path | None) -> None:
@@ -17,7 +26,7 @@ def _read_config(ctx: click.Context, parameter: click.Parameter, value: Path | N
         settings = tomllib.loads(value.read_text("utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{value}: is no TOML ({error})") from None
-    options = {
+    options = {STUDIES: STUDIES} | {
         option.removeprefix("--").replace("-", "_"): one.name
         for one in ctx.command.params
         for option in one.opts
@@ -29,8 +38,32 @@ def _read_config(ctx: click.Context, parameter: click.Parameter, value: Path | N
     ctx.default_map = {options[name.replace("-", "_")]: value for name, value in settings.items()}
 
 
+class _Place(click.ParamType):
+    """DIR or NAME=DIR; a list of them in the environment is separated as in PATH."""
+
+    name = "place"
+    envvar_list_splitter = os.pathsep
+
+    def convert(self, value, param, ctx):
+        from app.hosting import named
+
+        if not isinstance(value, str):
+            return value
+        name, rest = (None, value) if Path(value).is_dir() else named(value)
+        if Path(rest).is_file():
+            self.fail(f"{rest!r} is a file; expected a folder", param, ctx)
+        return name, Path(rest)
+
+
 @click.command(context_settings={"auto_envvar_prefix": "SUBDERMAL_SERVE"})
-@click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@click.argument(
+    STUDIES,
+    metavar="DIR...",
+    nargs=-1,
+    required=True,
+    envvar="SUBDERMAL_SERVE_STUDIES",
+    type=_Place(),
+)
 @click.option(
     "--host",
     default="127.0.0.1",
@@ -53,8 +86,13 @@ def _read_config(ctx: click.Context, parameter: click.Parameter, value: Path | N
 )
 @click.option(
     "--database",
-    metavar="URL",
-    help="Database of the answers, as an SQLAlchemy URL. Without it DIR/study.sqlite3.",
+    "databases",
+    multiple=True,
+    metavar="[NAME=]URL",
+    help=(
+        "Database of the answers, as an SQLAlchemy URL, without it DIR/study.sqlite3; of several "
+        "studies one of each, by its name."
+    ),
 )
 @click.option(
     "--enrolments",
@@ -93,35 +131,41 @@ def _read_config(ctx: click.Context, parameter: click.Parameter, value: Path | N
     ),
 )
 def command(
-    directory: Path,
+    studies: tuple[tuple[str | None, Path], ...],
     host: str,
     port: int,
     workers: int,
-    database: str | None,
+    databases: tuple[str, ...],
     enrolments: int,
     trusted_hosts: tuple[str, ...],
     metrics_token: str | None,
     trusted_proxy: str | None,
 ) -> None:
     """Serve the questionnaire and the dashboard of the study in DIR (a folder with a
-    manifest.json).
+    manifest.json), or of several studies.
+
+    One study stands at /. Of several the first stands there, so that its addresses stay, and each
+    other one at /s/NAME/, where NAME is its own name, or another one where it is given as NAME=DIR.
+    The accounts of the first are those of all.
 
     Every option may also stand in the environment, --port as SUBDERMAL_SERVE_PORT, or in a file.
     At the first start an account `owner` is made and its password shown once; `subdermal account`
     makes others. Simulated participants of the same study, if there are any, are under /simulated/.
     """
-    from werkzeug.middleware.dispatcher import DispatcherMiddleware
+    from app import accounts, server
+    from app.errors import InputError
+    from app.hosting import assemble, named
 
-    from app import accounts, create_app, server
-
-    settings = {"trusted_hosts": trusted_hosts, "metrics_token": metrics_token}
-    app = create_app(directory, database, enrolments=enrolments, **settings)
-    study, answers = app.extensions["study"], app.extensions["database"]
-    application, simulated = app, (study.directory / "simulated.sqlite3").is_file()
-    if simulated:
-        doorkeeper = app.extensions["doorkeeper"]  # one sign-in is for both
-        twin = create_app(directory, simulated=True, doorkeeper=doorkeeper, **settings)
-        application = DispatcherMiddleware(app, {"/simulated": twin})
+    urls = dict(named(one) for one in databases)
+    if len(urls) < len(databases):
+        raise InputError("--database: expected one of each study, as NAME=URL")
+    application, hosted = assemble(
+        studies,
+        urls,
+        enrolments=enrolments,
+        trusted_hosts=trusted_hosts,
+        metrics_token=metrics_token,
+    )
     proxy = {}
     if trusted_proxy:
         proxy = {
@@ -129,23 +173,35 @@ def command(
             "trusted_proxy_headers": {"x-forwarded-for", "x-forwarded-proto", "x-forwarded-host"},
         }
     sockets = server.listen(host, port)
-    with answers.write() as session:
+    with hosted[0].app.extensions["database"].write() as session:
         shown = accounts.add_first(session)
 
     address = (
         f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{server.port_of(sockets)}"
     )
-    click.echo(f"questionnaire  {address}/")
-    click.echo(f"dashboard      {address}/dashboard/")
+    for one in hosted:
+        if len(hosted) > 1:
+            click.echo(f"study          {one.name}")
+        _tell(one, address)
+    if len(hosted) > 1:
+        click.echo(f"all studies    {address}/dashboard/studies")
     if shown:
         click.echo(f"password       {shown}   (of the account {accounts.FIRST}; shown only now)")
-    if study.report(False).is_file():
-        click.echo(f"report         {address}/dashboard/report/")
-    if simulated:
-        click.echo(f"simulated      {address}/simulated/dashboard/")
-        if study.report(True).is_file():
-            click.echo(f"               {address}/simulated/dashboard/report/")
     click.echo("Ctrl+C ends the server; every answer that was acknowledged is saved.")
-    for one in (app, twin) if simulated else (app,):
-        one.extensions["database"].close()  # each worker opens its own connections
+    for one in hosted:
+        for app in filter(None, (one.app, one.twin)):
+            app.extensions["database"].close()  # each worker opens its own connections
     server.run(application, sockets, workers, **proxy)
+
+
+def _tell(hosted: Hosted, address: str) -> None:
+    """The addresses of a study."""
+    root, study = address + hosted.root, hosted.app.extensions["study"]
+    click.echo(f"questionnaire  {root}/")
+    click.echo(f"dashboard      {root}/dashboard/")
+    if study.report(False).is_file():
+        click.echo(f"report         {root}/dashboard/report/")
+    if hosted.twin:
+        click.echo(f"simulated      {root}/simulated/dashboard/")
+        if study.report(True).is_file():
+            click.echo(f"               {root}/simulated/dashboard/report/")

@@ -20,14 +20,14 @@ from flask import (
     send_from_directory,
     url_for,
 )
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app import accounts, export, logs, parquet, recruiting, researchers
+from app import accounts, export, logs, monitoring, parquet, recruiting, researchers
 from app.dashboard import live
-from app.models import LogEntry, Participant, plain_code
+from app.models import LogEntry, Participant, Response, plain_code
 from app.security import REPORT_POLICY
-from app.web import database, download, simulated, study
+from app.web import database, download, hosted, simulated, study
 
 blueprint = Blueprint("dashboard", __name__, url_prefix="/dashboard")
 #: Of the log, on the page; log.csv has all.
@@ -262,6 +262,18 @@ def links_csv():
     with database().read() as db:
         body = "".join(export.links_csv(db))
     return download(body, "links.csv")
+
+
+@blueprint.get("/studies")
+def studies():
+    """All studies of the server, for who is signed in."""
+    rows = []
+    for one in hosted():
+        with one.app.extensions["database"].read() as db:
+            last = db.scalar(select(func.max(Response.answered_at)))
+            row = {"record": recruiting.record_of(db), "last": last} | monitoring.counts(db)
+        rows.append({"hosted": one, "title": one.app.extensions["study"].definition.title} | row)
+    return render_template("dashboard/studies.html", rows=rows, states=recruiting.STATES)
 
 
 @blueprint.get("/log")

@@ -50,6 +50,7 @@ CLOSED = [
         "recruits.csv",
         "log",
         "log.csv",
+        "studies",
         "links.csv",
         "completions.csv",
         "codebook.csv",

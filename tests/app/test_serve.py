@@ -201,6 +201,11 @@ def test_what_cannot_be_served_gets_one_line(study_dir, tmp_path, capsys):
             ([tmp_path], "manifest.json"),
             ([tmp_path / "nothing"], "manifest.json"),
             ([study_dir, "--database", "nonsense"], "expected an SQLAlchemy URL"),
+            ([study_dir, "--database", "a=sqlite://"], "expected NAME=URL, with one of ready-made"),
+            ([study_dir, "--database", "a", "--database", "b"], "expected one of each study"),
+            ([study_dir, study_dir], "two studies are called ready-made"),
+            ([], "Missing argument 'DIR...'"),
+            ([study_dir / "manifest.json"], "is a file; expected a folder"),
             ([study_dir, "--port", "seven"], "'seven' is not a valid integer"),
             ([study_dir, "--config", wrong], "prot is no option; expected database"),
             ([study_dir, "--config", study_dir / "manifest.json"], "is no TOML"),
@@ -239,3 +244,55 @@ def test_behind_a_proxy_that_ends_https_the_cookie_is_for_https_only(study_dir, 
     )
     plain = serve(study_dir)  # without the option, nobody is believed
     assert "; Secure" not in httpx.get(plain.url, headers=forwarded).headers["Set-Cookie"]
+
+
+def test_several_studies_under_several_workers_behind_a_proxy(write_study, tmp_path, serve):
+    """From a file: the first at the root, the second beside it, a sign-in that every worker of
+    every study knows, cookies for https alone.
+    """
+    faces = write_study(tmp_path / "faces", name="faces", title="Faces")
+    hands = write_study(tmp_path / "hands", name="hands", title="Hands")
+    database = f"sqlite:///{tmp_path}/hands.sqlite3"
+    (tmp_path / "serve.toml").write_text(
+        f'studies = ["{faces}", "other={hands}"]\ndatabase = ["other={database}"]\n'
+        'workers = 2\ntrusted-proxy = "127.0.0.1"\ntrusted-host = ["study.example"]\n'
+    )
+    server = serve("--config", tmp_path / "serve.toml")
+    at = [line.split(None, 1) for line in server.printed.splitlines()]
+    places = [place for what, place in at if what in ("study", "questionnaire")]
+    assert places == ["faces", server.url, "other", f"{server.url}s/other/"]
+    headers = {"X-Forwarded-Proto": "https", "X-Forwarded-Host": "study.example"}
+    assert httpx.get(server.url).status_code == 400  # not asked under this name
+    with httpx.Client(headers=headers) as http:
+        pages = [http.get(f"{server.url}s/other{path}") for path in ("/", "/dashboard/studies")]
+        assert "Hands" in pages[0].text and pages[1].headers["Location"].startswith("/s/other/")
+        set_cookies = pages[0].headers.get_list("set-cookie")
+        assert all("; Secure" in one and "; Path=/s/other" in one for one in set_cookies)
+        # httpx sends nothing that is for https alone over http: a browser behind the proxy does
+        kept = {}
+
+        def ask(method, path, **sent):
+            cookies = "; ".join(f"{name}={value}" for name, value in kept.items())
+            sent["headers"] = {"Cookie": cookies, "Referer": "https://study.example/"}
+            reply = http.request(method, f"{server.url.rstrip('/')}{path}", **sent)
+            for one in reply.headers.get_list("set-cookie"):
+                name, value = one.split(";")[0].split("=", 1)
+                kept[name] = value
+            return reply
+
+        login = "/s/other/dashboard/login"
+        data = {"csrf_token": token(ask("GET", login)), "name": "owner"}
+        reply = ask("POST", login, data=data | {"password": server.find("password")})
+        assert reply.headers["Location"] == "/s/other/dashboard/studies"
+        for _ in range(4):
+            for path in ("/dashboard/studies", "/s/other/dashboard/log", "/dashboard/"):
+                assert ask("GET", path).status_code == 200
+        assert ask("GET", "/s/faces/?PID=1").headers["Location"] == "/?PID=1"
+
+
+def test_studies_stand_in_the_environment(write_study, tmp_path, serve, monkeypatch):
+    folders = [write_study(tmp_path / name, name=name) for name in ("faces", "hands")]
+    monkeypatch.setenv("SUBDERMAL_SERVE_STUDIES", os.pathsep.join(map(str, folders)))
+    monkeypatch.setenv("SUBDERMAL_SERVE_WORKERS", "1")
+    server = serve()
+    assert httpx.get(f"{server.url}s/hands/").status_code == 200
