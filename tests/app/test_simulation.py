@@ -11,6 +11,7 @@ from app.cli import main
 from app.models import Participant, Response
 from app.server import running
 from app.simulation.client import Visitor
+from app.simulation.designs import compare
 from app.simulation.people import ANSWERING, GAIN_JOD, PUBLISHED_PRIORITIES, Crowd
 from app.study import Study
 
@@ -189,3 +190,13 @@ def test_answers_sent_are_answers_stored(study_dir):
             )
         assert db.get(Participant, 1).familiarity == crowd.familiarity(1)
     assert study.seed == 7
+
+
+def test_both_designs_of_pairs_are_compared_on_the_same_people():
+    """The comparison of both designs: the same sums of answers, the same seed the same numbers."""
+    one = compare(items=8, spread=6.0, people=12, pairs=9, studies=6, seed=1)
+    assert one == compare(items=8, spread=6.0, people=12, pairs=9, studies=6, seed=1)
+    mean = 12 * 9 / 28
+    assert 0.5 * mean - 2 <= one.least < mean < one.most
+    assert one.gain[1] <= one.gain[0] <= one.gain[2]
+    assert all(0.5 < share <= 1 for share in one.order)
