@@ -8,10 +8,11 @@
 # make test-visibility  install ColorVideoVDP and torch too, run the tests of predicted visibility
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
+# make gallery        draw the pictures of docs/gallery.md again
 # make translations   collect the messages of the pages into app/translations/*/*.po and compile them
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-bayes test-cluster test-parquet test-postgres test-visibility demo bench translations clean
+.PHONY: help setup gallery test test-bayes test-cluster test-parquet test-postgres test-visibility demo bench translations clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -76,6 +77,26 @@ endif
 
 bench: setup
 	@for name in $(BENCH); do printf '\n== %s\n' "$$name"; PYTHONPATH=. .venv/bin/python "benchmarks/$$name.py" || exit 1; done
+
+JPEG = .venv/bin/python -c 'import sys; from PIL import Image; Image.open(sys.argv[1]).convert("RGB").save(sys.argv[2], quality=90, optimize=True)'
+
+# The commands of docs/gallery.md, in its order.
+gallery: setup
+	$(SUBDERMAL) build stimuli/studies/thesis.toml --out build/thesis
+	$(SUBDERMAL) strip build/thesis --crop 270x270+830+540 --crop 270x300+1520+365 --out docs/close-up.png
+	$(SUBDERMAL) compare thesis -t all -t golubev:samples=256 -f close-up --size 480x270 --crop 270x110+180+95 --walks 64 --out docs/reference/close-up.png
+	$(SUBDERMAL) compare docs/scenes/bars.toml -t deon_luebke:texturing=0 --against jimenez_gaussian:texturing=0 --size 480x270 --out docs/scenes/bars.png
+	$(SUBDERMAL) compare docs/scenes/spots.toml -t jimenez_separable:jitter=false -t jimenez_separable -t golubev --against deon_luebke --size 480x180 --columns 2 --out docs/scenes/spots.png
+	$(SUBDERMAL) render --scene docs/scenes/maps.toml -t golubev --size 1280x336 --out docs/scenes/maps.png
+	$(SUBDERMAL) build stimuli/studies/spheres.toml --out build/spheres
+	$(SUBDERMAL) strip build/spheres -f lamp -f behind -f environment --out build/spheres.png
+	$(SUBDERMAL) build stimuli/studies/stone.toml --out build/stone
+	$(SUBDERMAL) strip build/stone -f lamp -f behind -f two_lamps -f environment --out build/stone.png
+	$(SUBDERMAL) illumination build/illumination --samples 128
+	$(SUBDERMAL) redraw docs/figures
+	$(JPEG) build/spheres.png docs/scenes/spheres.jpg
+	$(JPEG) build/stone.png docs/scenes/stone.jpg
+	$(JPEG) build/illumination/gallery.png docs/illumination.jpg
 
 translations: setup
 	mkdir -p build
