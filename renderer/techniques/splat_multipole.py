@@ -58,7 +58,7 @@ class SplatMultipole(PointsTechnique):
     thinnest: float = parameter(
         1.2, unit="mean free paths", low=1.01, high=64.0, source="Rohat 2012, sec. 5.1.2: 4"
     )
-    blur_through: float = parameter(1.0, unit="of the spacing", low=0.0, high=4.0, source="by eye")
+    blur_through: float = parameter(2.0, unit="of the spacing", low=0.0, high=4.0, source="by eye")
     depth: str = parameter("face", choices=("face", "light"), source="Rohat 2012, fig. 5.7: light")
     distance: str = parameter(
         "along", choices=("along", "published"), source="Rohat 2012, eq. 5.2: published"

@@ -141,6 +141,19 @@ def test_the_documents_distance_loses_most_of_what_comes_through():
     assert (got[1] < 0.55 * got[0]).all()
 
 
+def test_the_edges_of_a_thin_slat_lit_from_behind_are_even():
+    """1 mm of marble, points 0.7 mm apart: along its edges, where single points are missing, light
+    deviates by less than 7 % of its mean (by 14 % with half of the blur)."""
+    table = behind_a_sheet(1.0)
+    table["objects"]["sheet"]["size_mm"] = [8.0, 40.0]
+    with drawn(table, (28, 48)) as frame:
+        got = scattered(frame, renderer.make("splat_multipole"), of_marble(frame.inputs(None)))
+    columns = np.flatnonzero((got[..., 1] > 0).all(axis=0))
+    for column in (columns[0], columns[-1]):
+        light = got[:, column].mean(axis=1)
+        assert light.std() < 0.07 * light.mean()
+
+
 def test_constant_light_stays_constant():
     """On a thick ball: exactly where it is normalised; 2 % beside the share of a splat by the sum
     (the ball's curvature takes the rest, (1 - n . n') / 2 of which is of the far face)."""
