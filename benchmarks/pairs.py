@@ -14,7 +14,7 @@ from tqdm import tqdm
 from app.simulation.designs import compare
 
 #: Techniques, pairs a person, studies.
-SIZES = ((5, 5, 400), (10, 22, 100), (20, 32, 40))
+SIZES = ((5, 5, 200), (10, 22, 60), (20, 32, 20))
 SPREADS = (0.5, 5.0)
 
 
@@ -22,7 +22,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--people", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--studies", type=int, help="of each row; by default 400, 100 and 40")
+    parser.add_argument("--studies", type=int, help="of each row; by default 200, 60 and 20")
     parser.add_argument("--items", type=int, action="append", help="rows of these alone")
     given = parser.parse_args()
     rows = [

@@ -9,8 +9,10 @@ sampling for pairwise comparisons via approximate message passing and informatio
 maximization", ICPR, arXiv:2004.05691. Both choose batches by a spanning tree; here a batch is one
 person's list, and after each of its pairs the covariance is as if the pair had been answered, so
 that the next one tells something else. Users of theirs report repeated pairs and lopsided counts
-(gfxdisp/asap, issues 9 and 13): here no person meets a pair twice, and pairs that fell behind
-`least_share` of the mean come first.
+(gfxdisp/asap, issues 9 and 13): here no person meets a pair twice, pairs that fell behind
+`least_share` of the mean come first, and of pairs that tell nearly as much as the best one the one
+that was asked least, so that the noise of few answers does not steer: among near-equal techniques
+the greatest information alone costs a quarter of all answers (`benchmarks/pairs.py`).
 
 No package is used: theirs is published as notebooks and MATLAB, without releases.
 """
@@ -80,13 +82,15 @@ def chosen(
     techniques: Sequence[str],
     pairs: int,
     least_share: float,
+    as_good: float,
     share: Callable[[], float],
 ) -> list[tuple[str, str, str]]:
     """So many pairs (cell, left, right) for the next person: each at most once, of all cells as
     many to one, those first that fell behind, then those that tell most.
 
     Sides: of each pair the one that was seldomer on the left; of even ones that of the technique
-    that was. least_share: 0 to 1, of a cell's mean count of a pair. share: random numbers, 0 to 1.
+    that was. least_share: 0 to 1, of a cell's mean count of a pair; as_good: 0 to 1, of the most
+    that a pair tells. share: random numbers, 0 to 1.
     """
     known = list(combinations(range(len(techniques)), 2))
     asked = {cell: np.asarray(state[cell])[:, :2].sum() for cell in cells}
@@ -94,7 +98,7 @@ def chosen(
     result = []
     for place, cell in enumerate(by_need):
         some = pairs // len(cells) + (place < pairs % len(cells))
-        places = _of_cell(state[cell], len(techniques), some, least_share, share)
+        places = _of_cell(state[cell], len(techniques), some, least_share, as_good, share)
         result += _sided(cell, state[cell], [(k, *known[k]) for k in places], techniques, share)
     return result
 
@@ -104,6 +108,7 @@ def _of_cell(
     items: int,
     some: int,
     least_share: float,
+    as_good: float,
     share: Callable[[], float],
 ) -> list[int]:
     """The pairs of one cell, by their places among `combinations`."""
@@ -120,7 +125,8 @@ def _of_cell(
             spread = np.einsum("ki,ij,kj->k", ends, covariance, ends)
             gain = information(ends @ mean, np.maximum(spread, 0))
             gain[places] = -np.inf
-            k = int(np.lexsort((lots, -np.round(gain, 9)))[0])  # lots among equals
+            worse = gain < as_good * gain.max()
+            k = int(np.lexsort((lots, -np.round(gain, 9), count, worse))[0])
         places.append(k)
         p = _logistic(ends[k] @ mean)
         along = covariance @ ends[k]

@@ -42,12 +42,15 @@ class Assignment:
     design      `DEALT` or `ADAPTIVE`
     least_share of an adaptive design: pairs that were asked less than this share of their mean come
                 first, 0 to 1
+    as_good     of an adaptive design: of pairs that tell at least this share of the most that one
+                tells, the one that was asked least is taken, 0 to 1; 1: always what tells most
     beside      of an adaptive design: the share of people who are dealt theirs, 0 to 1
     """
 
     pairs: int = 0
     design: str = DEALT
     least_share: float = 0.5
+    as_good: float = 0.8
     beside: float = 0.0
 
     def record(self) -> dict:
@@ -77,7 +80,7 @@ def read_assignment(table: Table, pairs: int) -> Assignment:
         )
         return float(value)
 
-    assignment = Assignment(some, design, part("least_share"), part("beside"))
+    assignment = Assignment(some, design, part("least_share"), part("as_good"), part("beside"))
     table.end()
     return assignment
 

@@ -87,7 +87,15 @@ def adaptive_trials(
     was asked and answered before, give the same ones again.
     """
     share = _shares(seed, _ADAPTIVE, number)
-    pairs = chosen(state, cells, techniques, assignment.pairs, assignment.least_share, share)
+    pairs = chosen(
+        state,
+        cells,
+        techniques,
+        assignment.pairs,
+        assignment.least_share,
+        assignment.as_good,
+        share,
+    )
     main = [Trial(place, *one) for place, one in enumerate(_shuffled(pairs, share), start=1)]
     if not quality or not quality.questions:
         return main

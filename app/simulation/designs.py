@@ -56,10 +56,11 @@ def compare(
     studies: int,
     seed: int,
     least_share: float = Assignment.least_share,
+    as_good: float = Assignment.as_good,
 ) -> Compared:
-    """Both designs on the same truths; `least_share` is of the adaptive one."""
+    """Both designs on the same truths; `least_share` and `as_good` are of the adaptive one."""
     truth = np.linspace(-spread / 2, spread / 2, items)
-    designs = (Assignment(pairs), Assignment(pairs, ADAPTIVE, least_share))
+    designs = (Assignment(pairs), Assignment(pairs, ADAPTIVE, least_share, as_good))
     squared = np.empty((2, studies, 2))
     right, counted = np.empty((2, studies)), []
     for study in range(studies):

@@ -107,3 +107,17 @@ def test_the_share_of_the_mean_is_what_bounds_lopsided_counts():
         counts = np.array(state["near"])[:, :2].sum(axis=1)
         shares[least] = counts.min() / counts.max()
     assert shares[0.0] < 0.4 < 0.6 < shares[1.0]
+
+
+def test_techniques_that_are_alike_are_asked_evenly():
+    """The noise of few answers does not steer; always what tells most would let it."""
+    spans = {}
+    for as_good in (0.8, 1.0):
+        state, rng = nothing(CELLS, ITEMS), np.random.default_rng(4)
+        for number in range(1, 31):
+            design = Assignment(8, ADAPTIVE, as_good=as_good)
+            trials = adaptive_trials(CELLS, ITEMS, 5, number, None, design, state)
+            state = taken_part(state, trials, np.zeros(5), rng)
+        counts = np.array([state[cell] for cell in CELLS])[..., :2].sum(axis=2)
+        spans[as_good] = np.ptp(counts, axis=1).max()
+    assert spans[0.8] <= 2 < spans[1.0]
