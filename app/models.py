@@ -288,6 +288,22 @@ class LogEntry(Base):
     detail: Mapped[str] = mapped_column(String(1000))
 
 
+class Note(Base):
+    """What a researcher noted about a participant or, without one, about the study; for researchers
+    alone. The application only ever appends.
+    """
+
+    __tablename__ = "notes"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    participant_id: Mapped[int | None] = mapped_column(ForeignKey("participants.id"), index=True)
+    at: Mapped[datetime] = mapped_column(default=now)
+    who: Mapped[str] = mapped_column(String(64))  # the name of an account
+    text: Mapped[str] = mapped_column(String(2000))
+
+    participant: Mapped[Participant | None] = relationship()
+
+
 class Account(Base):
     """Somebody who may sign in to the dashboards of a server. Read in the database of its first
     study alone, as are the two tables below.

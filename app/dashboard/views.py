@@ -23,7 +23,7 @@ from flask import (
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app import accounts, export, logs, monitoring, parquet, recruiting, researchers
+from app import accounts, export, logs, monitoring, notes, parquet, recruiting, researchers
 from app.dashboard import live
 from app.models import LogEntry, Participant, Response, plain_code
 from app.security import REPORT_POLICY
@@ -56,11 +56,13 @@ blueprint.context_processor(researchers.of_page)
 def index():
     with database().read() as db:
         record, entries = recruiting.record_of(db), _entries(db)[:LATEST_ENTRIES]
+        noted = notes.on(db, None)
     return render_template(
         "dashboard/index.html",
         record=record,
         states=recruiting.STATES,
         log=entries,
+        notes=noted,
         images=study().manifest.images,
         cell_labels={
             cell.name: study().definition.cell_label(cell) for cell in study().definition.cells
@@ -183,9 +185,15 @@ def participant(code: str):
         people = live.participants(db, study(), answers)
         row = next(one for one in people if one["code"] == someone.code)
         entries = _entries(db, LogEntry.detail.startswith(f"{someone.code}: "))
+        noted = notes.on(db, someone)
     rules = live.judged_by(study(), live.quality(study(), answers).get(someone.code))
     return render_template(
-        "dashboard/participant.html", person=someone, row=row, rules=rules, log=entries
+        "dashboard/participant.html",
+        person=someone,
+        row=row,
+        rules=rules,
+        log=entries,
+        notes=noted,
     )
 
 
@@ -274,6 +282,46 @@ def studies():
             row = {"record": recruiting.record_of(db), "last": last} | monitoring.counts(db)
         rows.append({"hosted": one, "title": one.app.extensions["study"].definition.title} | row)
     return render_template("dashboard/studies.html", rows=rows, states=recruiting.STATES)
+
+
+@blueprint.get("/notes")
+def all_notes():
+    """The latest notes, on whatever; notes.csv has all."""
+    with database().read() as db:
+        noted = notes.latest(db, ENTRIES)
+    return render_template("dashboard/notes.html", notes=noted)
+
+
+@blueprint.post("/notes")
+def add_note():
+    """Note something about the study."""
+    with database().write() as db:
+        _note(db, None)
+    return redirect(url_for(".index"), 303)
+
+
+@blueprint.post("/participants/<code>/notes")
+def add_note_on(code: str):
+    """Note something about a participant."""
+    with database().write() as db:
+        _note(db, _someone(db, code))
+    return redirect(url_for(".participant", code=code), 303)
+
+
+def _note(db: Session, someone: Participant | None) -> None:
+    text = request.form.get("note", "").replace("\r\n", "\n").strip()
+    if not text or len(text) > notes.LONGEST:
+        flash(f"A note has 1 to {notes.LONGEST} characters; this one has {len(text)}.")
+    else:
+        notes.add(db, someone, text, who=_who())
+
+
+@blueprint.get("/notes.csv")
+def notes_csv():
+    """All notes, without a word of the answers."""
+    with database().read() as db:
+        body = "".join(notes.csv(db))
+    return download(body, "notes.csv")
 
 
 @blueprint.get("/log")

@@ -240,11 +240,15 @@ def test_people_of_one_study_cannot_be_judged_by_another(server):
     assert owner.get("/dashboard/participants/P0001").status_code == 200
     assert owner.get("/s/hands/dashboard/participants/P0001").status_code == 404
     owner.get("/s/hands/dashboard/")
-    form = owner.form("code") | {"reason": "no"}
-    judged = owner.http.post("/s/hands/dashboard/participants/P0001", data=form)
-    assert judged.status_code == 404
+    form = owner.form("code") | {"reason": "no", "note": "no"}
+    for path in ("", "/notes"):
+        judged = owner.http.post(f"/s/hands/dashboard/participants/P0001{path}", data=form)
+        assert judged.status_code == 404
     with kept(server.first).read() as db:
         assert db.get_one(Participant, 1).excluded_at is None
+    owner.http.post("/s/hands/dashboard/notes", data=form | {"note": "of hands"})
+    assert "of hands" in owner.get("/s/hands/dashboard/notes").text
+    assert "of hands" not in owner.get("/dashboard/notes").text
 
 
 def test_the_index_says_how_each_study_stands(server):

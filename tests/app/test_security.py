@@ -31,6 +31,8 @@ POSTS = [
     "/dashboard/state",
     "/dashboard/quota",
     "/dashboard/participants/P0001",
+    "/dashboard/participants/P0001/notes",
+    "/dashboard/notes",
     "/simulation/",
 ]
 CLOSED = [
@@ -51,6 +53,8 @@ CLOSED = [
         "log",
         "log.csv",
         "studies",
+        "notes",
+        "notes.csv",
         "links.csv",
         "completions.csv",
         "codebook.csv",
