@@ -27,6 +27,7 @@ class Codebook:
 
     familiarity: labels of the levels of the self-rating; ratings: the levels, as answered.
     factors: the columns of the levels that a study varies beside framing; images differ by them.
+    made_from: what its images were made from, with whose it is and under which licence.
     factor: the column of the table that answers are grouped by. Where it is not 'framing',
     `framings` are its levels; see `by`.
     """
@@ -41,6 +42,7 @@ class Codebook:
     title: str = ""
     factor: str = FRAMING
     factors: tuple[str, ...] = ()
+    made_from: tuple[str, ...] = ()
 
     @property
     def factor_words(self) -> str:
@@ -141,9 +143,14 @@ def read_manifest(path: str | Path | ManifestFile) -> Codebook:
     Images are not looked at.
     """
     manifest = path if isinstance(path, ManifestFile) else open_manifest(path)
-    return of_study(
+    codebook = of_study(
         manifest.study, f"{manifest.path}: study", f"the study's ({manifest.path.name})"
     )
+    credits = [
+        f"{one.get('what')} ({', '.join(str(one[k]) for k in ('credit', 'licence') if k in one)})"
+        for one in manifest.licences
+    ]
+    return replace(codebook, made_from=tuple(dict.fromkeys(credits)))
 
 
 def of_study(study: Mapping, where: str = "study", rule: str = "the study's") -> Codebook:

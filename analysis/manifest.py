@@ -71,6 +71,18 @@ class ManifestFile:
             raise InputError(f"{self.path}: images is {images!r:.60}, expected a list of tables")
         return images
 
+    @property
+    def licences(self) -> list[dict]:
+        """What the images were made from, each with `what`, `licence` and `source`, some with
+        `credit`.
+        """
+        licences = self.value.get("licences", [])
+        if not isinstance(licences, list) or not all(isinstance(one, dict) for one in licences):
+            raise InputError(
+                f"{self.path}: licences is {licences!r:.60}, expected a list of tables"
+            )
+        return licences
+
     def region(self, place: int) -> tuple[float, float, float, float]:
         """The part of an image that is compared and shown: its own `region`, else that of its
         framing, else all of it; left, top, right, bottom, 0 to 1.

@@ -175,6 +175,11 @@ def paragraphs(responses: Responses, options: Options, declared: str) -> list[tu
             "before anything was computed.",
         ),
         *([("Grouping", " ".join(responses.grouping))] if responses.grouping else []),
+        *(
+            [("Images", f"The images were made from {'; '.join(codebook.made_from)}.")]
+            if codebook.made_from
+            else []
+        ),
         (
             "Scores and priorities",
             "A strong preference gives two points, a slight one gives one. For the Analytic "

@@ -321,6 +321,28 @@ def test_a_study_gives_order_and_labels_and_finds_strangers(tmp_path, write, ans
     )
 
 
+def test_the_methods_say_what_the_images_were_made_from(tmp_path, write, answer):
+    from analysis import methods
+    from analysis.options import Options
+
+    path = manifest(tmp_path)
+    table = json.loads(path.read_text())
+    table["licences"] = [
+        {"what": "a bust", "licence": "CC-BY-4.0", "source": "there", "credit": "A. Maker"},
+        {"what": "lamps", "licence": "CC0-1.0", "source": "here"},
+    ]
+    path.write_text(json.dumps(table))
+    responses = read_responses(write([answer("P1", "far", "a", "b", 1)]), read_manifest(path))
+    text = dict(methods.paragraphs(responses, Options(), "here"))
+    assert text["Images"] == (
+        "The images were made from a bust (A. Maker, CC-BY-4.0); lamps (CC0-1.0)."
+    )
+    table["licences"] = "mine"
+    path.write_text(json.dumps(table))
+    with pytest.raises(InputError, match="licences is 'mine', expected a list of tables"):
+        read_manifest(path)
+
+
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
