@@ -13,6 +13,7 @@ VERBS = {
     "experiment": "app.commands.experiment",
     "build": "app.commands.build",
     "study": "app.commands.study",
+    "inspect": "app.commands.inspect",
     "strip": "app.commands.strip",
     "power": "app.commands.power",
     "serve": "app.commands.serve",

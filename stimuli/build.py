@@ -269,7 +269,11 @@ def _remove_strays(out: Path, done: dict[str, dict], wanted: set[str]) -> None:
         if path.is_file() and manifest.sha256(path) == done[file]["image"]["sha256"]:
             path.unlink()
         records.remove(out, file)
-    for folder in ("images", records.FOLDER):
+    cells = {Path(file).name for file in wanted}
+    for path in (out / manifest.MASKS).glob("*.png"):
+        if not any(name.startswith(f"{path.stem}_") for name in cells):
+            path.unlink()
+    for folder in ("images", manifest.MASKS, records.FOLDER):
         for part in (out / folder).glob(PARTS):
             part.unlink(missing_ok=True)
 

@@ -135,6 +135,7 @@ class Studio:
         render, out = task.render, Path(task.out)
         result = frame.render(stimulus.parameters)
         digest = write_png(out / stimulus.file, result.image, render.size)
+        _write_mask(out / manifest.MASKS / f"{stimulus.cell.name}.png", result.samples, render)
         further = {k: v for k, v in stimulus.cell.levels.items() if k != FRAMING}
         region = tuple(stimulus.scene.camera.region)
         image = {
@@ -277,6 +278,20 @@ def write_png(path: Path, pixels: np.ndarray, size: tuple[int, int]) -> str:
     with replacing(path) as temporary:
         PIL.Image.fromarray(pixels).save(temporary, format="PNG")
         return manifest.sha256(temporary)
+
+
+def _write_mask(path: Path, samples: np.ndarray, render: Render) -> None:
+    """Where light scatters, white, the same for all conditions of a cell: for `subdermal inspect`,
+    and to compute over the skin alone.
+    """
+    import PIL.Image
+
+    (width, height), s = render.size, render.supersample
+    path.parent.mkdir(exist_ok=True)
+    share = (samples > 0).reshape(height, s, width, s).mean(axis=(1, 3))
+    with replacing(path) as temporary:
+        mask = PIL.Image.fromarray(np.where(share >= 0.5, 255, 0).astype(np.uint8))
+        mask.save(temporary, format="PNG")
 
 
 def _time(out: Path, stimuli: list[Stimulus], frame: Any, rounds: int) -> None:

@@ -26,6 +26,10 @@ FORMAT = FORMATS[-1]
 _MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
 
 
+#: Folder of a built study: CELL.png, white where light scatters.
+MASKS = "masks"
+
+
 @dataclass(frozen=True)
 class Image:
     """An image of the study; `renderer`, `head` and `scene` are None where it was made elsewhere.

@@ -847,3 +847,23 @@ def test_triplets_on_a_large_screen_a_phone_and_at_twice_the_zoom(
     rows = [row for _, row in stored(app)]
     assert [row.view for row in rows] == [mode] * 3
     assert [row.device_pixel_ratio for row in rows] == [ratio for *_, ratio in screens]
+
+
+def test_inspect_shows_a_study_without_a_server(study_dir, page):
+    from app.cli import main
+
+    assert main(["inspect", str(study_dir)]) == 0
+    page.goto((study_dir / "inspection" / "index.html").as_uri())
+    page.wait_for_selector(".question.shown")
+    boxes = [canvas.bounding_box() for canvas in page.locator(".pair canvas").all()]
+    assert len(boxes) == 2 and min(box["width"] for box in boxes) > 200
+    first = page.locator("img[data-map]").get_attribute("src")
+    page.select_option("select[data-b]", "golubev_plus")
+    page.wait_for_function(
+        "src => document.querySelector('[data-map]').getAttribute('src') !== src", arg=first
+    )
+    page.keyboard.press("v")
+    assert page.locator("[data-mode=flicker]").get_attribute("aria-pressed") == "true"
+    assert page.evaluate("document.querySelector('[data-map]').naturalWidth") == 960
+    page.locator("button[data-show]").last.click()
+    assert page.locator("select[data-cell]").input_value() == "half-length"

@@ -142,6 +142,13 @@ class FakeRenderer:
     def info(self):
         return {"version": "1", "gl_vendor": type(self).driver}
 
+    def samples(self):
+        """The right half scatters, with 4 and 9 samples in turn."""
+        counts = np.zeros([self.supersample * side for side in reversed(self.size)], np.uint16)
+        counts[::2, counts.shape[1] // 2 :] = 4
+        counts[1::2, counts.shape[1] // 2 :] = 9
+        return counts
+
     @contextmanager
     def frame(self, camera, picture):
         framing = camera.framing
@@ -154,7 +161,7 @@ class FakeRenderer:
             made_from = repr((self, framing, parameters, picture))
             colour = hashlib.sha256(made_from.encode()).digest()[:3]
             image = np.tile(np.frombuffer(colour, np.uint8), (self.size[1], self.size[0], 1))
-            return SimpleNamespace(image=image, samples=np.array([[0, 4], [0, 9]], np.uint16))
+            return SimpleNamespace(image=image, samples=self.samples())
 
         def time(techniques, rounds):
             return {
