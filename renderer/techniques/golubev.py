@@ -9,12 +9,14 @@ that know depth, normalised by their sum.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 
-from renderer.optics import burley, fits
+from renderer.optics import burley, fits, media
 from renderer.optics.curve import Curve
+from renderer.optics.medium import Stack
 from renderer.parameters import parameter
 from renderer.techniques.base import Inputs
 from renderer.techniques.rotated import GOLDEN, RotatedTechnique
@@ -24,8 +26,10 @@ FILTER_CDF = 0.997  # the share of the energy within the filter's radius
 
 @dataclass(frozen=True)
 class BurleyFilter(RotatedTechnique):
-    """What the filters share whose kernel is Burley's profile: its distances, fitted to the
-    medium's curve unless given.
+    """What the filters share whose kernel is Burley's profile: its distances, unless given those
+    that `parametrisation` has: "fitted" to the medium's curve, or what Burley's published fits say
+    of the albedo and the length of the index-matched medium nearest to that curve (light straight
+    down by mean free path or by diffuse mean free path, light from everywhere).
     """
 
     distance_mm: tuple[float, float, float] | None = parameter(
@@ -35,6 +39,11 @@ class BurleyFilter(RotatedTechnique):
         high=100.0,
         source="fitted to the medium's curve where it is not given",
         optional=True,
+    )
+    parametrisation: str = parameter(
+        "fitted",
+        choices=("fitted", *burley.PARAMETRISATIONS),
+        source="thesis, eqs. 2.86, 2.88, 2.89: mfp, dmfp, diffuse; Burley 2015",
     )
     scale: float = parameter(
         1.0,
@@ -53,8 +62,12 @@ class BurleyFilter(RotatedTechnique):
 
     def distances(self, curve: Curve) -> np.ndarray:
         """d per channel after scaling, mm: (3,)."""
-        own = self.distance_mm
-        distances = fits.burley_distance(curve).distance_mm if own is None else np.array(own)
+        if self.distance_mm is not None:
+            distances = np.array(self.distance_mm)
+        elif self.parametrisation == "fitted":
+            distances = fits.burley_distance(curve).distance_mm
+        else:
+            distances = _parametrised(curve, self.parametrisation)
         return distances * self.scale
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
@@ -63,6 +76,13 @@ class BurleyFilter(RotatedTechnique):
     def filter_radius_mm(self, curve: Curve) -> float:
         """Radius that holds FILTER_CDF of the widest channel's energy."""
         return float(burley.inverse_cdf(FILTER_CDF, self.distances(curve).max()))
+
+
+@lru_cache(maxsize=64)
+def _parametrised(curve: Curve, parametrisation: str) -> np.ndarray:
+    """d of Burley's published fits for the medium nearest to a curve, mm: (C,)."""
+    medium = media.invert(curve).medium
+    return burley.Burley(Stack.of(medium), parametrisation).distance_mm()
 
 
 @dataclass(frozen=True)
