@@ -1,7 +1,9 @@
 """The web server, waitress: in several processes (`serve`) or beside other work (`simulate`).
 
 Waitress reads a request whole before a thread takes it up and sends the answer when the visitor can
-take it, so that slow and idle visitors cost a socket each and no thread.
+take it, so that slow and idle visitors cost a socket each and no thread. It is one process; the
+others, and those that replace what died, are forked here. (gunicorn, which manages processes,
+gives a thread to each new connection: see docs/serving.md.)
 """
 
 from __future__ import annotations
@@ -16,24 +18,36 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from waitress import create_server, wasyncore
 
 from app.errors import InputError
 
-THREADS = 8
-#: Connections that a process holds, where the system lets it open so many files.
-CONNECTIONS = 10_000
 #: Files that a process opens beside its connections, at most.
 OTHER_FILES = 200
-#: A connection on which nothing happens is closed after this time; browsers open it anew.
-IDLE_S = 60
 #: Larger than anything a page of ours sends.
 LARGEST_HEADER, LARGEST_BODY = 64 * 1024, 256 * 1024
 #: A process that ends sooner than this is not started anew before it has passed.
 SHORTEST_LIFE_S = 1.0
-#: As long a process may take to end its requests when the server stops.
-PATIENCE_S = 10.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What each process holds and waits for."""
+
+    threads: int = 8  # requests that are answered at once
+    connections: int = 10_000  # at most, where the system lets a process open so many files
+    idle_s: int = 60  # a connection on which nothing happens is closed; browsers open it anew
+    grace_s: int = 10  # to end the requests that are being answered when the server stops
+
+    def __post_init__(self):
+        for name, value in vars(self).items():
+            if type(value) is not int or value < 1:
+                raise ValueError(f"{name} is {value!r}; expected a whole number from 1")
+
+
+USUAL = Limits()
 
 
 def listen(host: str, port: int) -> list[socket.socket]:
@@ -62,14 +76,20 @@ def port_of(sockets: list[socket.socket]) -> int:
     return sockets[0].getsockname()[1]
 
 
-def run(application: Callable, sockets: list[socket.socket], workers: int, **settings) -> None:
+def run(
+    application: Callable,
+    sockets: list[socket.socket],
+    workers: int,
+    limits: Limits = USUAL,
+    **settings,
+) -> None:
     """Serve until interrupted or told to end, in `workers` processes; one that dies is replaced.
 
     The application must hold no connection and no thread when this is called.
     """
     if workers == 1:
         signal.signal(signal.SIGTERM, _end)
-        _server(application, sockets, **settings).run()
+        _server(application, sockets, limits, **settings).run()
         return
     closes_with_us, _held = os.pipe()
 
@@ -78,7 +98,7 @@ def run(application: Callable, sockets: list[socket.socket], workers: int, **set
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches us all; the parent decides
         signal.signal(signal.SIGTERM, _end)
         threading.Thread(target=_end_with, args=[closes_with_us], daemon=True).start()
-        _server(application, sockets, **settings).run()
+        _server(application, sockets, limits, **settings).run()
 
     signal.signal(signal.SIGTERM, _end)
     began: dict[int, float] = {}
@@ -93,20 +113,21 @@ def run(application: Callable, sockets: list[socket.socket], workers: int, **set
                 time.sleep(max(0.0, SHORTEST_LIFE_S - lived))
                 began[_fork(work)] = time.monotonic()
     finally:
-        _stop(list(began))
+        _stop(list(began), limits.grace_s)
 
 
-def _server(application: Callable, sockets: list[socket.socket], **settings):
+def _server(application: Callable, sockets: list[socket.socket], limits: Limits, **settings):
     # a line for each request that waits for a thread says nothing that a person could act on
     logging.getLogger("waitress.queue").setLevel(logging.ERROR)
     return create_server(
         application,
         sockets=sockets,
-        threads=THREADS,
+        threads=limits.threads,
         ident=None,
         clear_untrusted_proxy_headers=True,
-        connection_limit=_connections(),
-        channel_timeout=IDLE_S,
+        connection_limit=_connections(limits.connections),
+        channel_timeout=limits.idle_s,
+        cleanup_interval=min(30, max(1, limits.idle_s // 2)),  # how often it looks for them
         max_request_header_size=LARGEST_HEADER,
         max_request_body_size=LARGEST_BODY,
         # select() knows 1,024 files at most
@@ -115,14 +136,14 @@ def _server(application: Callable, sockets: list[socket.socket], **settings):
     )
 
 
-def _connections() -> int:
+def _connections(most_connections: int) -> int:
     """How many connections this process may hold, with its limit of open files raised."""
     try:
         import resource
     except ImportError:  # no such limits on this system
-        return CONNECTIONS
+        return most_connections
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = CONNECTIONS + OTHER_FILES
+    wanted = most_connections + OTHER_FILES
     files = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
     resource.setrlimit(resource.RLIMIT_NOFILE, (files, most))
     return max(files - OTHER_FILES, files // 2)
@@ -151,10 +172,10 @@ def _end_with(pipe: int) -> None:
     os._exit(1)
 
 
-def _stop(processes: list[int]) -> None:
+def _stop(processes: list[int], grace_s: float) -> None:
     for process in processes:
         os.kill(process, signal.SIGTERM)
-    deadline = time.monotonic() + PATIENCE_S
+    deadline = time.monotonic() + grace_s
     while processes and time.monotonic() < deadline:
         processes = [one for one in processes if os.waitpid(one, os.WNOHANG)[0] == 0]
         time.sleep(0.02)
@@ -168,7 +189,7 @@ def running(application: Callable) -> Iterator[str]:
     """Serve on a free port of this machine meanwhile, in a thread; gives the address."""
     opened: dict = {}
     sockets = listen("127.0.0.1", 0)
-    server = _server(application, sockets, map=opened)
+    server = _server(application, sockets, USUAL, map=opened)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
     try:

@@ -85,6 +85,34 @@ class _Place(click.ParamType):
     help="Processes that answer; each needs about 100 MB of memory of its own.",
 )
 @click.option(
+    "--threads",
+    default=8,
+    show_default=True,
+    type=click.IntRange(1, 256),
+    help="Requests that a process answers at once; others wait.",
+)
+@click.option(
+    "--connections",
+    default=10_000,
+    show_default=True,
+    type=click.IntRange(1, 1_000_000),
+    help="Connections that a process holds, where it may open so many files.",
+)
+@click.option(
+    "--idle",
+    default=60,
+    show_default=True,
+    type=click.IntRange(1, 86_400),
+    help="Seconds after which a connection on which nothing happens is closed.",
+)
+@click.option(
+    "--grace",
+    default=10,
+    show_default=True,
+    type=click.IntRange(1, 3600),
+    help="Seconds in which requests that are being answered may end when the server stops.",
+)
+@click.option(
     "--database",
     "databases",
     multiple=True,
@@ -135,6 +163,10 @@ def command(
     host: str,
     port: int,
     workers: int,
+    threads: int,
+    connections: int,
+    idle: int,
+    grace: int,
     databases: tuple[str, ...],
     enrolments: int,
     trusted_hosts: tuple[str, ...],
@@ -191,7 +223,8 @@ def command(
     for one in hosted:
         for app in filter(None, (one.app, one.twin)):
             app.extensions["database"].close()  # each worker opens its own connections
-    server.run(application, sockets, workers, **proxy)
+    limits = server.Limits(threads, connections, idle, grace)
+    server.run(application, sockets, workers, limits, **proxy)
 
 
 def _tell(hosted: Hosted, address: str) -> None:

@@ -18,6 +18,7 @@ import pytest
 
 from app import create_app
 from app.cli import main
+from app.server import Limits
 
 pytestmark = (
     pytest.mark.sqlite
@@ -146,6 +147,23 @@ def test_a_worker_that_is_killed_is_replaced_and_none_outlives_the_server(study_
         for _ in range(500):
             httpx.get(server.url, timeout=20)
             time.sleep(0.02)
+
+
+def test_a_connection_on_which_nothing_happens_is_closed_after_the_time_that_is_set(
+    study_dir, serve
+):
+    server = serve(study_dir, "--workers", 1, "--idle", 1)
+    address = "127.0.0.1", int(server.url.split(":")[-1].strip("/"))
+    with socket.create_connection(address, timeout=60) as silent:
+        began = time.monotonic()
+        assert silent.recv(1) == b"" and time.monotonic() - began >= 1
+
+
+@pytest.mark.parametrize("name", ["threads", "connections", "idle_s", "grace_s"])
+def test_limits_are_whole_numbers_from_one(name):
+    for wrong in (0, -1, 1.5, "8", True):
+        with pytest.raises(ValueError, match=f"{name} is .*; expected a whole number from 1"):
+            Limits(**{name: wrong})
 
 
 def test_told_to_end_it_ends_its_workers(study_dir, serve):
