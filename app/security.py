@@ -11,19 +11,19 @@ import threading
 import time
 from collections import defaultdict, deque
 from collections.abc import Iterable
-from datetime import timedelta
-from typing import TYPE_CHECKING
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Any
 
 from flask import Flask, abort, current_app, request
 from flask.sessions import SecureCookieSessionInterface
 from flask_babel import gettext
 from flask_wtf import CSRFProtect
+from itsdangerous import SignatureExpired, URLSafeTimedSerializer
 from werkzeug.sansio.utils import host_is_trusted
 from werkzeug.wsgi import get_current_url
 
 if TYPE_CHECKING:
     from _typeshed.wsgi import StartResponse, WSGIApplication, WSGIEnvironment
-    from itsdangerous import URLSafeTimedSerializer
 
 CONTENT_POLICY = "; ".join(
     (
@@ -54,14 +54,38 @@ REPORT_POLICY = "; ".join(
 COOKIE_LIFETIME = timedelta(days=60)
 
 
+class _Signer(URLSafeTimedSerializer):
+    """Takes what it signed itself in the future too: where the clock is set back, nobody loses
+    their place.
+    """
+
+    def loads(
+        self,
+        signed: str | bytes,
+        max_age: int | None = None,
+        return_timestamp: bool = False,
+        salt: str | bytes | None = None,
+    ) -> Any:
+        value, signed_at = super().loads(signed, return_timestamp=True, salt=salt)
+        if max_age is not None and (datetime.now(UTC) - signed_at).total_seconds() > max_age:
+            raise SignatureExpired("signed too long ago", payload=value, date_signed=signed_at)
+        return (value, signed_at) if return_timestamp else value
+
+
 class _Sessions(SecureCookieSessionInterface):
     """Signed cookies that are marked Secure exactly when the page came over https."""
 
-    _signer: URLSafeTimedSerializer | None = None
+    _signer: _Signer | None = None
 
-    def get_signing_serializer(self, app: Flask) -> URLSafeTimedSerializer | None:
+    def get_signing_serializer(self, app: Flask) -> _Signer:
         if self._signer is None:  # the key of a database never changes
-            self._signer = super().get_signing_serializer(app)
+            made = super().get_signing_serializer(app)
+            self._signer = _Signer(
+                made.secret_keys,
+                salt=made.salt,
+                serializer=made.serializer,
+                signer_kwargs=made.signer_kwargs,
+            )
         return self._signer
 
     def get_cookie_secure(self, app: Flask) -> bool:

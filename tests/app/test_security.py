@@ -1,7 +1,10 @@
 """What strangers and hostile input must not achieve."""
 
 import re
+from datetime import UTC, datetime
+from types import SimpleNamespace
 
+import itsdangerous.timed
 import pytest
 from flask import url_for
 from sqlalchemy.exc import OperationalError
@@ -337,3 +340,26 @@ def test_images_are_served_only_as_their_hash_says(app, study_dir):
     )
     image.path.write_bytes(image.path.read_bytes() + b"more")
     assert http.get(f"/images/{sha256}").status_code == 404
+
+
+def test_a_clock_that_jumps_costs_nobody_their_place(app, person, monkeypatch):
+    """Cookies are signed with a time: one of the future, as a clock that was set back leaves it, is
+    as good as any, and one of more than sixty days ago is not.
+    """
+    now = itsdangerous.timed.time.time()
+    clock = SimpleNamespace(time=lambda: now + 3600)
+    monkeypatch.setattr("itsdangerous.timed.time", clock)  # what signs
+    somebody = person().begin().answer(1)
+    monkeypatch.setattr("app.models.now", lambda: datetime.fromtimestamp(now, UTC))
+    clock.time = lambda: now
+    assert somebody.answer(2).answers == [1, 2] and somebody.rows[1].rt_server_ms >= 0
+    with somebody.http.session_transaction() as session:
+        kept = dict(session)
+    for days, path in ((59, "/question"), (61, "/")):
+        clock.time = lambda days=days: now - days * 86_400
+        cookie = app.session_interface.get_signing_serializer(app).dumps(kept)
+        clock.time = lambda: now
+        old = person()
+        old.http.set_cookie("subdermal", cookie)
+        old.get("/question")
+        assert old.path == path
