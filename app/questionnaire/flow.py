@@ -318,7 +318,9 @@ def _answer(
     answered_at = now()
     if shown is None or shown.trial_id != trial_id or shown.at > answered_at:
         began = answered_at - timedelta(milliseconds=given.rt_ms or 0)
-        shown = Shown(trial_id, max(began, due.consented_at), 1)
+        if due.consented_at <= answered_at:  # not where the clock was set back
+            began = max(began, due.consented_at)
+        shown = Shown(trial_id, began, 1)
     by_server = round((answered_at - shown.at).total_seconds() * 1000)
     rt_ms, reported = given.rt_ms, None
     if rt_ms is None:

@@ -350,9 +350,17 @@ def test_a_clock_that_jumps_costs_nobody_their_place(app, person, monkeypatch):
     clock = SimpleNamespace(time=lambda: now + 3600)
     monkeypatch.setattr("itsdangerous.timed.time", clock)  # what signs
     somebody = person().begin().answer(1)
-    monkeypatch.setattr("app.models.now", lambda: datetime.fromtimestamp(now, UTC))
     clock.time = lambda: now
-    assert somebody.answer(2).answers == [1, 2] and somebody.rows[1].rt_server_ms >= 0
+    back = datetime.fromtimestamp(now - 3600, UTC)
+    monkeypatch.setattr("app.questionnaire.flow.now", lambda: back)  # before the consent, too
+    assert somebody.answer(2).answers == [1, 2]
+    row = somebody.rows[1]
+    assert (row.rt_ms, row.rt_server_ms, row.timed_by, row.answered_at) == (
+        321,
+        321,
+        "browser",
+        back,
+    )
     with somebody.http.session_transaction() as session:
         kept = dict(session)
     for days, path in ((59, "/question"), (61, "/")):
