@@ -1,13 +1,16 @@
 """Durable, migrated, of one kind and one study for ever."""
 
 import json
+from pathlib import Path
 
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import inspect, select, text
 from sqlalchemy.exc import DatabaseError, IntegrityError
 
+import app as app_package
 from app import create_app
 from app.errors import InputError
 from app.models import Base, Participant, Response, StudyRecord, now
@@ -159,3 +162,15 @@ def test_an_answer_is_one_look_one_row_and_one_commit(app, person):
     statements.clear()
     somebody.get("/question")
     assert not any(text.startswith(("INSERT", "UPDATE", "DELETE")) for text in statements)
+
+
+def test_the_history_of_the_schema_is_one_line():
+    """No two migrations have one number, and each follows the one before it."""
+    folder = Path(app_package.__file__).parent / "migrations"
+    files = sorted((folder / "versions").glob("[0-9]*.py"))
+    numbers = [file.name[:4] for file in files]
+    assert len(numbers) == len(set(numbers)) and numbers[0] == "0001"
+    line = list(ScriptDirectory(folder).walk_revisions())[::-1]
+    assert [one.revision for one in line] == numbers
+    assert [one.down_revision for one in line] == [None, *numbers[:-1]]
+    assert [Path(one.path) for one in line] == files
