@@ -225,7 +225,7 @@ def test_what_cannot_be_served_gets_one_line(study_dir, tmp_path, capsys):
             ([], "Missing argument 'DIR...'"),
             ([study_dir / "manifest.json"], "is a file; expected a folder"),
             ([study_dir, "--port", "seven"], "'seven' is not a valid integer"),
-            ([study_dir, "--config", wrong], "prot is no option; expected database"),
+            ([study_dir, "--config", wrong], "prot is no option; expected connections"),
             ([study_dir, "--config", study_dir / "manifest.json"], "is no TOML"),
         ]
         for arguments, says in failures:
