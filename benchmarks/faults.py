@@ -123,13 +123,14 @@ class Server:
         self._command += ["--port", str(self.port), "--database", url, "--enrolments", "0"]
         self._command += ["--workers", str(workers)]
         self._environment = os.environ | (_clocked(clock) if clock else {})
+        self._log = (study.parent / "log").open("w+")
         self.start()
 
     def start(self) -> None:
         self._process = subprocess.Popen(
             self._command,
             stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            stderr=self._log,
             env=self._environment,
         )
 
@@ -154,7 +155,14 @@ class Server:
             time.sleep(0.02)
 
     def has_ended(self) -> bool:
+        """Whether it ended; an error where it was asked for what it cannot do."""
+        if self._process.poll() == 2 and "cannot be opened" not in (said := self._said()):
+            raise SystemExit(f"the server does not start: {said}")
         return self._process.poll() is not None
+
+    def _said(self) -> str:
+        self._log.seek(0)
+        return self._log.read()[-2000:]
 
 
 def _set(clock: Path, seconds: int) -> None:
