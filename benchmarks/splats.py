@@ -19,6 +19,7 @@ from renderer.scene import shapes
 from renderer.scene.relaxation import Mesh, relax
 from renderer.techniques.samples import Body, spread
 from stimuli import scenes
+from stimuli.experiment.cost import medians
 
 #: Frames a second, from the first row to the last.
 NUMBER = {"dipole": (62.1, 48.9, 38.9, 30.5, 25.4), "multipole": (40.1, 30.7, 24.1, 19.6, 15.2)}
@@ -78,7 +79,7 @@ def frame_of(height_mm: float, size: int, medium: str = "marble"):
 
 def spent(frame, techniques: dict, rounds: int) -> dict[str, float]:
     """CPU seconds of each, medians of rounds in turn."""
-    return {name: np.median(s[:, 1]) for name, s in frame.time(techniques, rounds).items()}
+    return {name: cpu for name, (_, cpu) in medians(frame, techniques, rounds).items()}
 
 
 def table(title: str, rows: list[tuple[str, float, float]], note: str = "") -> None:

@@ -17,6 +17,7 @@ import numpy as np
 
 import renderer
 from stimuli import scenes
+from stimuli.experiment.cost import medians
 
 ROUNDS = 5
 #: Of what works on the surface and takes seconds: rounds, and points farther apart than by default.
@@ -58,9 +59,9 @@ def main() -> None:
                 counts = frame.render(technique).samples
                 samples[name] = counts[counts > 0].mean()
             median = {
-                name: np.median(spent, axis=0)
+                name: spent
                 for timed, rounds in ((screen, given.rounds), (surface, SURFACE_ROUNDS))
-                for name, spent in frame.time(timed, rounds).items()
+                for name, spent in medians(frame, timed, rounds).items()
             }
             frame.close()
             print(

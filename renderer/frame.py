@@ -347,6 +347,32 @@ class Frame:
                     scattered.delete()
         return spent
 
+    def passes(self, technique: Technique) -> list[gl.Pass]:
+        """What each pass of a technique takes, drawn once more after shaders are compiled; then
+        "all", the whole of it with what is done between passes.
+        """
+        context = self.renderer.context
+        context.make_current()
+        clock = gl.Clock.of(self.renderer.info()["gl_renderer"])
+        for made in (None, clock):
+            context.clock = None
+            start = len(clock.passes)
+            for medium in range(1, max(1, len(self.renderer.media)) + 1):
+                inputs = self.inputs(**_light(technique), medium=medium)
+                gl.finish()
+                context.clock = made
+                began = time.perf_counter(), time.process_time()
+                try:
+                    technique.scatter(inputs).target.delete()
+                    gl.finish()
+                finally:
+                    context.clock = None
+            if made:
+                spent = time.perf_counter() - began[0], time.process_time() - began[1]
+                card = sum(one.card for one in clock.passes[start:])
+                clock.passes.append(gl.Pass("all", *spent, card))
+        return clock.passes
+
     def close(self) -> None:
         """Free the shared buffers."""
         self.renderer.context.make_current()

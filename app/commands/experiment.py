@@ -345,3 +345,84 @@ def visibility(study, screen, zoom, crop, write, out, **given) -> None:
     if write and not zoom and box is None:
         seen.write(folder, json.loads(json.dumps(seen.record(pairs, metric, asked))))
         click.echo(f"{folder / 'manifest.json'}: {len(pairs)} pairs under visibility")
+
+
+@command.command("cost")
+@click.argument("scene", default="thesis")
+@click.option(
+    "--out",
+    "-o",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for passes.csv, growth.* and quality.*.",
+)
+@click.option(
+    "--techniques",
+    "-t",
+    multiple=True,
+    default=["golubev", "golubev_plus", "subdermal", "jimenez_separable", "jimenez_gaussian"],
+    show_default=True,
+    metavar="NAME[:KEY=VALUE...]",
+    help="A technique with its parameters; repeat for more.",
+)
+@click.option("--framing", "-f", default="close-up", show_default=True, help="Of the scene.")
+@click.option(
+    "--axis",
+    "axes",
+    multiple=True,
+    type=click.Choice(["resolution", "covered", "samples", "triangles", "lights", "splats"]),
+    help="What cost may grow with; repeat for more; without it all.",
+)
+@drawing.size("960x540", "the largest images")
+@drawing.supersample(1, "Computed pixels in a pixel")
+@click.option(
+    "--rounds",
+    type=click.IntRange(1, 100),
+    default=3,
+    show_default=True,
+    help="Of each measurement, in turn; medians.",
+)
+@click.option(
+    "--walks",
+    type=click.IntRange(0, 4096),
+    default=0,
+    show_default=True,
+    help="Of the reference, for quality per cost; 0: without it.",
+)
+@drawing.patches("A value over the scene's, by its dotted key: lights.rim=false; repeat for more.")
+@drawing.seed("hair, skin noise and baked light")
+def cost(scene, out, techniques, framing, axes, walks, patches, **options) -> None:
+    """Measure what techniques cost in SCENE, pass by pass, how it grows, and quality per cost.
+
+    Timer queries on a graphics card; CPU time on software OpenGL, which is a processor's work.
+    Growth is a power law with the interval of its exponent.
+    """
+    from tqdm import tqdm
+
+    from stimuli.experiment import cost as costs
+    from stimuli.experiment.chapter import write_csv
+
+    out.mkdir(parents=True, exist_ok=True)
+    made, options = costs.chosen(techniques), costs.Options(**options)
+    table = costs.passes(scene, patches, framing, made, options)
+    write_csv(table, out / "passes.csv")
+    click.echo(f"{'technique':<34}{'pass':<44}{'wall ms':>9}{'CPU ms':>9}{'card ms':>9}")
+    for row in table:
+        spent = "".join(f"{1000 * row[name]:>9.1f}" for name in ("wall_s", "cpu_s", "card_s"))
+        click.echo(f"{row['technique']:<34}{row['pass']:<44}{spent}")
+    rows = []
+    growth = costs.grow(scene, patches, framing, made, axes or costs.AXES, options)
+    for row in tqdm(growth, unit="time", disable=None):
+        rows.append(row)
+        write_csv(rows, out / "growth.csv")  # a run that is ended keeps what it has measured
+    for (axis, name), law in costs.laws(rows, costs.timed_by(rows)).items():
+        click.echo(
+            f"{axis:<12}{name:<34} x^{law.b:.2f} ({law.low:.2f} to {law.high:.2f}, "
+            f"{law.points} points)"
+        )
+    files = costs.draw_growth(rows, out / "growth")
+    if walks:
+        best = costs.quality(scene, patches, framing, made, walks, options, table)
+        files += costs.draw_quality(best, costs.timed_by(best), out / "quality")
+    for file in files:
+        click.echo(f"{file}")

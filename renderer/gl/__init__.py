@@ -1,5 +1,6 @@
 """OpenGL by name: context, program, texture, target, mesh. Everything raises."""
 
+from renderer.gl.clock import Clock, Pass, timed
 from renderer.gl.context import GL, PLATFORMS, Context
 from renderer.gl.mesh import Mesh, draw_fullscreen, finish
 from renderer.gl.program import Program, source
@@ -8,9 +9,11 @@ from renderer.gl.texture import DepthArray, Target, Texture, TextureArray, draw_
 __all__ = [
     "GL",
     "PLATFORMS",
+    "Clock",
     "Context",
     "DepthArray",
     "Mesh",
+    "Pass",
     "Program",
     "Target",
     "Texture",
@@ -19,4 +22,5 @@ __all__ = [
     "draw_nothing",
     "finish",
     "source",
+    "timed",
 ]

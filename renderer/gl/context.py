@@ -34,6 +34,7 @@ class Context:
         self._dropped: list[tuple[Callable[[int], None], int, int]] = []
         self.held = self.most = 0
         self.nothing: tuple | None = None  # what draw_nothing draws with
+        self.clock = None  # renderer.gl.clock.Clock: times every pass
         name = os.environ["PYOPENGL_PLATFORM"]
         if name not in PLATFORMS:
             raise InputError(

@@ -52,10 +52,11 @@ class Drawing:
         **uniforms,
     ) -> None:
         """One pass over the whole of a target."""
-        into.bind(blend=blend)
         program = self.inputs.programs(shader, defines)
-        program.use(**{**program.accepts(self.given), **uniforms})
-        gl.draw_fullscreen(self.inputs.context)
+        with gl.timed(self.inputs.context, shader):
+            into.bind(blend=blend)
+            program.use(**{**program.accepts(self.given), **uniforms})
+            gl.draw_fullscreen(self.inputs.context)
 
     def __enter__(self) -> Self:
         return self
