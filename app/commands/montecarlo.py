@@ -2,6 +2,8 @@
 
 import click
 
+from app import workers as working
+
 
 @click.command()
 @click.option(
@@ -54,6 +56,7 @@ import click
     type=click.IntRange(1, 10_000),
     help="How many rings the radius is cut into, the finest in the middle.",
 )
+@working.options
 @click.option(
     "--no-cache",
     is_flag=True,
@@ -66,7 +69,18 @@ import click
     help="Write one JSON object with everything, instead of two tables.",
 )
 def command(
-    layers, photons, seed, illumination, n_above, n_below, r_max_mm, bins, no_cache, as_json
+    layers,
+    photons,
+    seed,
+    illumination,
+    n_above,
+    n_below,
+    r_max_mm,
+    bins,
+    workers,
+    cluster,
+    no_cache,
+    as_json,
 ) -> None:
     """Send photons through layers and say what is reflected, transmitted and absorbed, with
     standard errors.
@@ -76,18 +90,20 @@ def command(
     """
     from renderer.optics.montecarlo import Layer, simulate
 
-    result = simulate(
-        [Layer.parse(text) for text in layers],
-        photons,
-        seed,
-        n_above,
-        n_below,
-        illumination,
-        r_max_mm,
-        bins,
-        cache=not no_cache,
-        progress=True,
-    )
+    with working.crew(workers, cluster) as crew:
+        result = simulate(
+            [Layer.parse(text) for text in layers],
+            photons,
+            seed,
+            n_above,
+            n_below,
+            illumination,
+            r_max_mm,
+            bins,
+            cache=not no_cache,
+            progress=True,
+            executor=crew.executor,
+        )
     if as_json:
         import json
 

@@ -12,11 +12,10 @@ import hashlib
 import json
 import math
 import os
-import threading
 import time
 import zipfile
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 
@@ -30,7 +29,8 @@ BATCHES = 64
 CHUNK, CHUNK_S = (
     256,
     0.02,
-)  # photons between two looks at the stop sign: this many at first, then as many as take that long
+)  # photons between two looks at the clock: this many at first, then as many as take that long
+STRETCH_S = 0.25  # what a worker is given at a time, and loses when it is stopped
 SAVE_EVERY_S = 30.0
 BINS, MOST_BINS, ANGLES = 120, 10_000, 90
 ILLUMINATIONS = ("searchlight", "diffuse")
@@ -407,6 +407,7 @@ def simulate(
     cache: bool = True,
     progress: bool = False,
     threads: int | None = None,
+    executor: Executor | None = None,
 ) -> Result:
     """Send light on a stack of layers, first one on top, and count where it leaves.
 
@@ -432,7 +433,8 @@ def simulate(
 
     cache: keep the result in the user's cache, where an interrupted run goes on and one with more
     photons starts from the largest with fewer. progress: a bar on stderr. threads: one a core if
-    None; the numbers do not depend on it.
+    None. executor: walks instead of threads of this process, in as many workers as it has. The
+    numbers depend on neither.
     """
     layers = tuple(layers)
     photons, threads = (
@@ -456,7 +458,11 @@ def simulate(
     )
     run = Run(setting, photons, cache_folder() if cache else None)
     if (run.done < run.sizes).any():
-        run.go(progress, threads)
+        if executor is not None:
+            run.go(progress, executor)
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                run.go(progress, pool)
     return Result(setting, photons, run.tally)
 
 
@@ -528,13 +534,12 @@ class Run:
         finally:
             part.unlink(missing_ok=True)
 
-    def go(self, progress: bool, threads: int) -> None:
-        """Walk what is left. However this ends, what was walked is kept."""
+    def go(self, progress: bool, executor: Executor) -> None:
+        """Walk what is left, a stretch of each batch at a time. However this ends, the stretches
+        that are finished are kept.
+        """
         from tqdm import tqdm
 
-        from renderer.optics.walk import walk
-
-        arrays, lock, stop = self.setting.arrays(), threading.Lock(), threading.Event()
         bar = tqdm(
             total=int(self.sizes.sum()),
             initial=int(self.done.sum()),
@@ -543,40 +548,59 @@ class Run:
             unit_scale=True,
             disable=None if progress else True,
         )
+        waiting: dict[Future, int] = {}
 
-        def batch(b: int) -> None:
-            mine = Tally(self.setting)
-            sums, state, done = mine.sums[0], self.state[b], int(self.done[b])
-            sums[:] = self.tally.sums[b]
-            views = (mine.unscattered[0], mine.absorbed[0], mine.radial[0], mine.angular[0])
-            count = CHUNK
-            while done < self.sizes[b] and not stop.is_set():
-                count, start = min(count, int(self.sizes[b]) - done), time.perf_counter()
-                state = np.uint64(walk(count, state, *arrays, *views))
-                done += count
-                with lock:
-                    self.tally.sums[b], self.state[b], self.done[b] = sums, state, done
-                    bar.update(count)
-                if time.perf_counter() - start < CHUNK_S:
-                    count *= 2
+        def give(b: int) -> None:
+            left = int(self.sizes[b] - self.done[b])
+            if left:
+                stretch = (self.setting, self.state[b], self.tally.sums[b].copy(), left)
+                waiting[executor.submit(walk_stretch, *stretch)] = b
 
-        with bar, ThreadPoolExecutor(threads) as pool:
-            waiting = {
-                pool.submit(batch, b) for b in range(BATCHES) if self.done[b] < self.sizes[b]
-            }
+        def take(future: Future) -> None:
+            b = waiting.pop(future)
+            walked, self.state[b], self.tally.sums[b] = future.result()
+            self.done[b] += walked
+            bar.update(walked)
+
+        saved = time.monotonic()
+        with bar:
             try:
+                for b in range(BATCHES):
+                    give(b)
                 while waiting:
-                    finished, waiting = wait(
-                        waiting, timeout=SAVE_EVERY_S, return_when=FIRST_COMPLETED
-                    )
-                    for future in finished:
-                        future.result()
-                    if not finished:
-                        with lock:
-                            self.save()
+                    for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                        b = waiting[future]
+                        take(future)
+                        give(b)
+                    if time.monotonic() - saved > SAVE_EVERY_S:
+                        self.save()
+                        saved = time.monotonic()
             finally:
-                stop.set()
                 for future in waiting:
                     future.cancel()
-                with lock:
-                    self.save()
+                for future in [f for f in waiting if f.done() and not f.cancelled()]:
+                    if future.exception() is None:
+                        take(future)
+                self.save()
+
+
+def walk_stretch(
+    setting: Setting, state: np.uint64, sums: np.ndarray, most: int
+) -> tuple[int, np.uint64, np.ndarray]:
+    """Walk photons of one batch on from `state` for about STRETCH_S, `most` at most, and add to its
+    sums (K,): (how many, the next state, the sums). In whatever process: it carries all it needs,
+    and where a batch is cut changes nothing.
+    """
+    from renderer.optics.walk import walk
+
+    mine, walked, count = Tally(setting), 0, CHUNK
+    mine.sums[0] = sums
+    views = (mine.unscattered[0], mine.absorbed[0], mine.radial[0], mine.angular[0])
+    arrays, started = setting.arrays(), time.perf_counter()
+    while walked < most and time.perf_counter() - started < STRETCH_S:
+        count, before = min(count, most - walked), time.perf_counter()
+        state = np.uint64(walk(count, state, *arrays, *views))
+        walked += count
+        if time.perf_counter() - before < CHUNK_S:
+            count *= 2
+    return walked, state, mine.sums[0].copy()

@@ -13,6 +13,7 @@ import pytest
 
 from analysis.errors import InputError
 from app.workers import MOST_LOSSES, THREADS, crew
+from renderer.optics import montecarlo
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Writes a file in each of two processes for ever; Ctrl-C ends it.
@@ -112,6 +113,15 @@ def test_workers_end_when_they_are_to(tmp_path, who):
         while time.monotonic() < deadline:
             os.killpg(process.pid, 0)
             time.sleep(0.05)
+
+
+def test_photons_by_two_processes_are_those_of_threads():
+    """To the bit, wherever a batch is cut."""
+    layers = [montecarlo.Layer(n=1.4, mu_a=1, mu_s=10, g=0.9, d=0.5)]
+    alone = montecarlo.simulate(layers, 60_001, 3, cache=False, threads=1)
+    with crew(workers=2) as made:
+        shared = montecarlo.simulate(layers, 60_001, 3, cache=False, executor=made.executor)
+    assert shared.tally.sums.tobytes() == alone.tally.sums.tobytes()
 
 
 def test_one_kind_of_workers_is_asked_for():
