@@ -14,13 +14,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
 
 from analysis.errors import InputError
 from analysis.planning.closed_form import sign_power, tost_power
-from analysis.planning.plan import ANY, DESIGNS, GOALS, Plan
+from analysis.planning.plan import ANY, DESIGNS, GOALS, MOST_ANSWERS, Plan
 from analysis.planning.simulation import Studies
 
 #: Test -> goals that it has. 'declared' comes first, wherever results are told.
@@ -28,12 +31,58 @@ TESTS = {"declared": GOALS, "contrast": ("find",)}
 #: Holm over the family as the simulated study has it; its first step, alpha over the number of
 #: tests, which is what is left where no other pair helps; the pair's test alone.
 CORRECTIONS = ("family", "first", "none")
+#: Simulated studies of a part, and answers that a process keeps of its parts: 2 bytes each.
+PART, KEPT_ANSWERS = 125, MOST_ANSWERS
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some of a plan's simulated studies, drawn and decided together, in whatever process.
+
+    count: how many; differences: the truth at each framing, JOD; entropy, number: the part's
+    seed is the child of that number of `SeedSequence(entropy)`, so that what it draws depends on
+    neither the other parts nor who draws them.
+    """
+
+    plan: Plan
+    design: str
+    differences: tuple[float, ...]
+    count: int
+    entropy: tuple[int, ...]
+    number: int
+
+    def studies(self) -> Studies:
+        rng = np.random.default_rng(np.random.SeedSequence(self.entropy, spawn_key=(self.number,)))
+        truth = dict(zip(self.plan.framings, self.differences, strict=True))
+        return Studies(self.plan, self.design, truth.__getitem__, rng, self.count)
+
+
+#: What decides (a method of `Studies`), after which correction, with so many people.
+Question = tuple[str, str, int]
+
+_drawn: dict[str, Studies] = {}
+
+
+def decide(part: Part, questions: Sequence[Question]) -> np.ndarray:
+    """(questions, framings): how many of the part's studies are decided for the goal.
+
+    What was drawn is kept for the next questions, in each process, as far as `KEPT_ANSWERS` go.
+    """
+    name = repr(part)
+    if name not in _drawn:
+        size = part.count * part.plan.most * len(part.plan.framings) * len(part.plan.pairs)
+        while _drawn and (len(_drawn) + 1) * size > KEPT_ANSWERS:
+            del _drawn[next(iter(_drawn))]
+        _drawn[name] = part.studies()
+    studies = _drawn[name]
+    return np.array([getattr(studies, how)(people, c).sum(axis=0) for how, c, people in questions])
 
 
 def plan_table(
     plan: Plan,
     designs: Sequence[str] = DESIGNS,
     progress: Callable[[Iterable], Iterable] = lambda steps: steps,
+    executor: Executor | None = None,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Simulate the plan. Returns the curves and what is needed.
 
@@ -43,50 +92,51 @@ def plan_table(
     correction, people (NaN where more than `most` are), power, false_alarms: how often, with that
     many people (with `most` where more are needed), a study in which the pair does not differ finds
     a difference (goal find), or one in which it differs by the margin excludes it (goal exclude).
-    progress wraps the list of designs, as tqdm does.
+    progress wraps the list of designs, as tqdm does. executor: simulates, `PART` studies a task;
+    the numbers do not depend on it.
     """
     for design in designs:
         if design not in DESIGNS:
             raise InputError(f"the design is {design!r}, expected one of {', '.join(DESIGNS)}")
+    run = map if executor is None else executor.map
     at_margin = plan.answering.difference(plan.margin)
     grid = people_grid(plan.most)
     curves, needed = [], []
     for step, design in enumerate(progress(list(designs))):
         each = len(plan.pairs) if design == "full" else plan.each
-        by_truth = {
-            "find": plan.to_find,
-            "exclude": lambda _framing: 0.0,
-            "margin": lambda _framing: at_margin,
+        truths = {
+            "find": tuple(map(plan.to_find, plan.framings)),
+            "exclude": (0.0,) * len(plan.framings),
+            "margin": (at_margin,) * len(plan.framings),
         }
-        studies = {
-            truth: Studies(
-                plan, design, difference, np.random.default_rng([plan.seed, step, place])
-            )
-            for place, (truth, difference) in enumerate(by_truth.items())
+        rates = {
+            truth: _Rates(plan, design, differences, (plan.seed, step, place), run)
+            for place, (truth, differences) in enumerate(truths.items())
         }
         for goal in GOALS:
-            false = studies["exclude"] if goal == "find" else studies["margin"]
-            for test, goals in TESTS.items():
-                if goal not in goals:
-                    continue
-                for correction in CORRECTIONS:
-                    true = _Rates(plan, studies[goal], goal, test, correction)
-                    alarms = _Rates(plan, false, goal, test, correction)
-                    for place, framing in enumerate(plan.reported):
-                        head = (framing, design, each, goal, test, correction)
-                        powers = [true.at(people, place) for people in grid]
-                        for people, power in zip(grid, powers, strict=True):
-                            bounds = wilson(power, plan.studies)
-                            closed = closed_form(
-                                plan, design, goal, test, correction, people, framing
-                            )
-                            curves.append((*head, people, power, *bounds, closed))
-                        count = _needed(plan, true, place, grid, powers)
-                        at = plan.most if count is None else count
-                        needed.append(
-                            (*head, math.nan if count is None else count)
-                            + (true.at(at, place), alarms.at(at, place))
-                        )
+            kinds = [
+                (test, correction)
+                for test, goals in TESTS.items()
+                if goal in goals
+                for correction in CORRECTIONS
+            ]
+            true, false = rates[goal], rates["exclude" if goal == "find" else "margin"]
+            true.learn([(_method(test, goal), c, n) for test, c in kinds for n in grid])
+            for test, correction in kinds:
+                how = (_method(test, goal), correction)
+                for place, framing in enumerate(plan.reported):
+                    head = (framing, design, each, goal, test, correction)
+                    powers = [true.at(*how, people, place) for people in grid]
+                    for people, power in zip(grid, powers, strict=True):
+                        bounds = wilson(power, plan.studies)
+                        closed = closed_form(plan, design, goal, test, correction, people, framing)
+                        curves.append((*head, people, power, *bounds, closed))
+                    count = _needed(plan, partial(true.at, *how, place=place), grid, powers)
+                    at = plan.most if count is None else count
+                    needed.append(
+                        (*head, math.nan if count is None else count)
+                        + (true.at(*how, at, place), false.at(*how, at, place))
+                    )
     columns = ["framing", "design", "answers_each", "goal", "test", "correction", "people"]
     return (
         pd.DataFrame(curves, columns=[*columns, "power", "low", "high", "closed_form"]),
@@ -94,21 +144,42 @@ def plan_table(
     )
 
 
+def _method(test: str, goal: str) -> str:
+    """What of `Studies` decides."""
+    if test == "contrast":
+        return "contrasted"
+    return "detected" if goal == "find" else "excluded"
+
+
 class _Rates:
-    """Shares of studies that reach their goal, kept for each number of people."""
+    """Shares of the studies of one design and truth that are decided for the goal, by question."""
 
-    def __init__(self, plan: Plan, studies: Studies, goal: str, test: str, correction: str):
-        self.plan, self.correction = plan, correction
-        self.decide = studies.contrasted
-        if test == "declared":
-            self.decide = studies.detected if goal == "find" else studies.excluded
-        self.known: dict[int, np.ndarray] = {}
+    def __init__(
+        self,
+        plan: Plan,
+        design: str,
+        differences: tuple[float, ...],
+        entropy: tuple[int, ...],
+        run: Callable,
+    ):
+        self.plan, self.run = plan, run
+        self.parts = [
+            Part(plan, design, differences, min(PART, plan.studies - first), entropy, first // PART)
+            for first in range(0, plan.studies, PART)
+        ]
+        self.known: dict[Question, np.ndarray] = {}
 
-    def at(self, people: int, place: int) -> float:
+    def learn(self, questions: Sequence[Question]) -> None:
+        """Ask all at once, of every part."""
+        counts = sum(self.run(decide, self.parts, [questions] * len(self.parts)))
+        self.known |= dict(zip(questions, counts / self.plan.studies, strict=True))
+
+    def at(self, method: str, correction: str, people: int, place: int) -> float:
         """The share with so many people, at the framing in this place of `plan.reported`."""
-        if people not in self.known:
-            self.known[people] = self.decide(people, self.correction).mean(axis=0)
-        rates = self.known[people]
+        question = (method, correction, people)
+        if question not in self.known:
+            self.learn([question])
+        rates = self.known[question]
         return float(rates.mean() if self.plan.reported == (ANY,) else rates[place])
 
 
@@ -143,10 +214,10 @@ def closed_form(
 
 
 def _needed(
-    plan: Plan, rates: _Rates, place: int, grid: Sequence[int], powers: Sequence[float]
+    plan: Plan, rate: Callable[[int], float], grid: Sequence[int], powers: Sequence[float]
 ) -> int | None:
     """The fewest people from which on the power is reached on the whole grid; None where `most` are
-    too few.
+    too few. rate: the power with so many people.
     """
     short = [at for at, power in enumerate(powers) if power < plan.power]
     if short and short[-1] == len(grid) - 1:
@@ -156,7 +227,7 @@ def _needed(
     low, high = grid[short[-1]], grid[short[-1] + 1]
     while high - low > 1:
         middle = (low + high) // 2
-        if rates.at(middle, place) >= plan.power:
+        if rate(middle) >= plan.power:
             high = middle
         else:
             low = middle

@@ -36,8 +36,8 @@ ANSWERS = np.arange(-2, 3)
 
 
 class Studies:
-    """`plan.studies` simulated studies of one design and one truth, with `plan.most` people each;
-    smaller ones are their first people.
+    """So many simulated studies (`plan.studies` by default) of one design and one truth, with
+    `plan.most` people each; smaller ones are their first people.
 
     answers (studies, people, framings, pairs) int8: what everyone would answer; asked: bool, what
     they were asked.
@@ -49,16 +49,17 @@ class Studies:
         design: str,
         difference: Callable[[str], float],
         rng: np.random.Generator,
+        studies: int | None = None,
     ):
-        self.plan = plan
-        shape = (plan.studies, plan.most, len(plan.framings), len(plan.pairs))
+        self.plan, self.studies = plan, studies or plan.studies
+        shape = (self.studies, plan.most, len(plan.framings), len(plan.pairs))
         self.answers = np.empty(shape, np.int8)
         self.asked = np.ones(shape, bool)
         step = max(1, CHUNK // (plan.most * len(plan.pairs)))
         for place, framing in enumerate(plan.framings):
             worths = plan.truth(framing, difference(framing))
-            for first in range(0, plan.studies, step):
-                part = slice(first, min(first + step, plan.studies))
+            for first in range(0, self.studies, step):
+                part = slice(first, min(first + step, self.studies))
                 drawn = answers(plan, worths, part.stop - first, rng)
                 self.answers[part, :, place] = drawn
                 if design == "incomplete":
@@ -102,10 +103,10 @@ class Studies:
         """
         plan = self.plan
         pairs = [(b, a) for a, b in plan.pairs]
-        p = np.empty((plan.studies, len(plan.framings), len(pairs)))
+        p = np.empty((self.studies, len(plan.framings), len(pairs)))
         step = max(1, CHUNK // (people * len(plan.pairs)))
         for place in range(len(plan.framings)):
-            for first in range(0, plan.studies, step):
+            for first in range(0, self.studies, step):
                 part = slice(first, first + step)
                 asked = self.asked[part, :people, place]
                 shown = np.where(asked, self.answers[part, :people, place], np.int8(0))

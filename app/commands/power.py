@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from app import workers as working
 from app.answers import names, numbers, written
 
 
@@ -132,6 +133,7 @@ from app.answers import names, numbers, written
     type=int,
     help="Draws the simulated people; the same seed gives the same files.",
 )
+@working.options
 def command(
     study: Path,
     out: Path,
@@ -151,6 +153,8 @@ def command(
     most: int,
     studies: int,
     seed: int,
+    workers: int | None,
+    cluster: str | None,
 ) -> None:
     """Say how many people the study in STUDY.toml needs to find, or to exclude, a difference.
 
@@ -235,11 +239,13 @@ def command(
         seed=seed,
     )
     designs = designs or DESIGNS
-    curves, needed = plan_table(
-        plan,
-        designs,
-        lambda steps: tqdm(steps, desc="simulated studies", unit="design", disable=None),
-    )
+    with working.crew(workers, cluster) as crew:
+        curves, needed = plan_table(
+            plan,
+            designs,
+            lambda steps: tqdm(steps, desc="simulated studies", unit="design", disable=None),
+            crew.executor,
+        )
     fingerprint = declared.fingerprint(definition.analysis)
     files, sentences = power_files(plan, curves, needed, codebook, source, written(), fingerprint)
     write_files(files, out)

@@ -12,6 +12,8 @@ import click
 import pytest
 
 from analysis.errors import InputError
+from analysis.planning import Plan, plan_table
+from analysis.planning.power import PART
 from app.workers import MOST_LOSSES, THREADS, crew
 from renderer.optics import montecarlo
 
@@ -122,6 +124,16 @@ def test_photons_by_two_processes_are_those_of_threads():
     with crew(workers=2) as made:
         shared = montecarlo.simulate(layers, 60_001, 3, cache=False, executor=made.executor)
     assert shared.tally.sums.tobytes() == alone.tally.sums.tobytes()
+
+
+def test_power_by_two_processes_is_that_of_one():
+    """Of studies in two parts, each with a seed of its own."""
+    plan = Plan(("a", "b", "c"), ("a", "b"), studies=PART + 1, most=40)
+    alone = plan_table(plan)
+    with crew(workers=2) as made:
+        shared = plan_table(plan, executor=made.executor)
+    for here, there in zip(alone, shared, strict=True):
+        assert here.to_csv() == there.to_csv()
 
 
 def test_one_kind_of_workers_is_asked_for():
