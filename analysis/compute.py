@@ -67,13 +67,16 @@ what the levels hold, under the name 'all'.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from pathlib import Path
 
 import pandas as pd
 
 from analysis import agreement, ahp, bootstrap, inference, worth
 from analysis.options import Options
 from analysis.responses import Responses
+from analysis.worth import resampled
 
 
 @dataclass(frozen=True)
@@ -114,13 +117,18 @@ def everything(
     responses: Responses,
     options: Options | None = None,
     progress: Callable[[Iterable], Iterable] = lambda steps: steps,
+    executor: Executor | None = None,
+    folder: Path | None = None,
 ) -> Results:
     """All tables of this module's docstring.
 
     Deterministic: the same answers and options give the same bytes. progress wraps the list of
-    tables, as tqdm does.
+    tables, as tqdm does. executor: fits the worths of the resamples, which take longest; folder:
+    one that its workers see, the system's own for temporary files without it.
     """
     options = options or Options()
+    if executor is not None:
+        resampled.prepare(responses, options, executor, folder)
     tables = {name: TABLES[name](responses, options) for name in progress(list(TABLES))}
     notes = {name: table.attrs.get("notes", ()) for name, table in tables.items()}
     lines = [("all", line) for line in responses.grouping] + [

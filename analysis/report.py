@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor
 from pathlib import Path
 
 import jinja2
@@ -63,6 +64,8 @@ def report_responses(
     measured: Measured | None = None,
     visible: pd.DataFrame | None = None,
     progress: Callable[[Iterable], Iterable] = lambda steps: steps,
+    executor: Executor | None = None,
+    folder: Path | None = None,
 ) -> dict[str, bytes]:
     """All files of the analysis of a response table: path inside the output folder -> content.
 
@@ -70,7 +73,7 @@ def report_responses(
     present, else the first two. options: the choices of the analysis, and `declared`, where they
     come from; measured: what the manifest holds of cost and fidelity; visible: what was predicted
     of each pair (`visibility.read_visibility`). progress wraps the list of
-    tables, as tqdm does.
+    tables, as tqdm does; executor, folder: see `compute.everything`.
     """
     options = options or Options()
     codebook = responses.codebook
@@ -103,7 +106,7 @@ def report_responses(
             columns=["line", "column", "value", "expected"],
         ),
     } | {f"ahp_matrix_{slugs[framing]}": _matrix_table(one) for framing, one in comparisons.items()}
-    results = compute.everything(responses, options, progress)
+    results = compute.everything(responses, options, progress, executor, folder)
     tables |= results.tables
     beside, correlated = None, None
     if measured is not None:

@@ -37,6 +37,7 @@ from analysis import bootstrap
 from analysis.options import Options
 from analysis.panel import Panel, panels, tied, wins, with_notes
 from analysis.responses import Responses
+from analysis.worth import resampled
 from analysis.worth.binary import (
     JOD_SIGMA,
     bradley_terry,
@@ -139,7 +140,7 @@ def parameters(responses: Responses, options: Options) -> pd.DataFrame:
             reduced = no_maximum(panel, "davidson") is not None
             strict, level = wins(panel, panel.counts, "drop"), tied(panel, panel.counts)
             log_nu = float(davidson(strict, level, reduced)[1])
-            _, draws = _davidson_draws(panel, options)
+            _, draws, _ = resampled.draws(panel, "davidson", options)
             low, high = bootstrap.interval(draws, panel.people, options.level)
             if np.isfinite(log_nu):
                 rows.append((name, "davidson", "log_nu", log_nu, float(low), float(high)))
@@ -232,7 +233,7 @@ def bootstrapped(panel: Panel, model: str, options: Options) -> np.ndarray:
     By maximum likelihood; all with reduced bias where some resample has no finite maximum and the
     fallback is on. NaN where a resample has no fit.
     """
-    return _draws(panel, model, options)[0]
+    return resampled.draws(panel, model, options)[0]
 
 
 def estimated(panel: Panel, model: str, options: Options) -> np.ndarray:
@@ -245,7 +246,7 @@ def estimated(panel: Panel, model: str, options: Options) -> np.ndarray:
     reduced = no_maximum(panel, model, options.ties) is not None
     if reduced and options.fallback == "none":
         return empty
-    return _solve(panel, model, panel.counts, options.ties, reduced)
+    return resampled.solve(panel, model, panel.counts, options.ties, reduced)[0]
 
 
 def fit(panel: Panel, model: str, options: Options) -> Fit:
@@ -259,7 +260,7 @@ def fit(panel: Panel, model: str, options: Options) -> Fit:
     if model == "ordinal":
         return _ordinal(panel, options, reason)
     estimate = estimated(panel, model, options)
-    draws, without = _draws(panel, model, options)
+    draws, _, without = resampled.draws(panel, model, options)
     low, high = bootstrap.interval(draws, panel.people, options.level)
     notes = []
     if reason:
@@ -287,7 +288,7 @@ def wald_covariance(panel: Panel, model: str, options: Options) -> np.ndarray | 
     """(n, n): the inverse information of the fit with reduced bias, where resamples have to be
     fitted so; None where all are maximum likelihood.
     """
-    if options.fallback == "none" or not _draws(panel, model, options)[1]:
+    if options.fallback == "none" or not resampled.draws(panel, model, options)[2]:
         return None
     counts = panel.counts
     if model == "davidson":
@@ -301,44 +302,6 @@ def widened(
     """The interval made at least as wide as value +- z errors; NaN stays."""
     half = stats.norm.ppf((1 + level) / 2) * errors
     return np.minimum(low, value - half), np.maximum(high, value + half)
-
-
-def _solve(panel: Panel, model: str, counts: np.ndarray, ties: str, reduced: bool) -> np.ndarray:
-    if model == "davidson":
-        return davidson(wins(panel, counts, "drop"), tied(panel, counts), reduced)[0]
-    solve = {"bradley_terry": bradley_terry, "thurstone_jod": thurstone_jod}[model]
-    return solve(wins(panel, counts, ties), reduced)
-
-
-def _draws(panel: Panel, model: str, options: Options) -> tuple[np.ndarray, int]:
-    """Worths of the resamples, and how many have no maximum of the likelihood."""
-    if model == "davidson":
-        key = ("davidson", options.resamples, options.seed, options.fallback)
-        _davidson_draws(panel, options)
-        return panel.kept[key][0], panel.kept[key][2]
-    key = (model, options.ties, options.resamples, options.seed, options.fallback)
-    if key not in panel.kept:
-        counts = bootstrap.counts(panel, options)
-        draws = _solve(panel, model, counts, options.ties, False)
-        without = int((~np.isfinite(draws)).any(axis=1).sum())
-        if without and options.fallback != "none":
-            draws = _solve(panel, model, counts, options.ties, True)
-        panel.kept[key] = draws, without
-    return panel.kept[key]
-
-
-def _davidson_draws(panel: Panel, options: Options) -> tuple[np.ndarray, np.ndarray]:
-    """Worths (resamples, n) and log nu (resamples,)."""
-    key = ("davidson", options.resamples, options.seed, options.fallback)
-    if key not in panel.kept:
-        counts = bootstrap.counts(panel, options)
-        strict, level = wins(panel, counts, "drop"), tied(panel, counts)
-        draws, log_nu = davidson(strict, level)
-        without = int((~np.isfinite(draws)).any(axis=1).sum())
-        if without and options.fallback != "none":
-            draws, log_nu = davidson(strict, level, True)
-        panel.kept[key] = draws, log_nu, without
-    return panel.kept[key][:2]
 
 
 def ordinal_fit(panel: Panel, options: Options) -> Ordinal | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from app import workers as working
 from app.answers import names, read_answers, study_option, tell, varied_option, written
 
 # matrices are small: a second thread of OpenBLAS adds a fifth of the CPU; read when numpy is loaded
@@ -104,6 +105,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     type=float,
     help="Level of the intervals, 0.95 without it; tests are at one less this level.",
 )
+@working.options
 def command(
     responses: Path | None,
     out: Path,
@@ -114,6 +116,8 @@ def command(
     factor: str | None,
     varied: tuple[str, ...] | None,
     reference: str,
+    workers: int | None,
+    cluster: str | None,
     **choices: object,
 ) -> None:
     """Turn the answers in RESPONSES, a responses.csv, into tables, figures and a report to read.
@@ -147,16 +151,16 @@ def command(
     answers, manifest, study = read_answers(responses, study, order, factor, varied)
     declared = manifest.declared if manifest else {}
     chosen = declarations.options(declared, f"{study}: study.analysis", **choices)
-    files = report_responses(
-        answers,
-        pair,
-        written(),
-        chosen,
-        _source(declared, choices),
-        read_measures(manifest, reference, factor or FRAMING) if manifest else None,
-        read_visibility(manifest, factor or FRAMING) if manifest else None,
-        _progress,
-    )
+    measures = read_measures(manifest, reference, factor or FRAMING) if manifest else None
+    visible = read_visibility(manifest, factor or FRAMING) if manifest else None
+    source = _source(declared, choices)
+    with working.crew(workers, cluster) as crew:
+        if crew.executor is not None:
+            out.mkdir(parents=True, exist_ok=True)
+        files = report_responses(
+            *(answers, pair, written(), chosen, source, measures, visible),
+            *(_progress, crew.executor, out),
+        )
     write_files(files, out)
 
     tell(responses, answers)

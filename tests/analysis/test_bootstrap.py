@@ -8,6 +8,7 @@ from scipy import stats
 
 from analysis import bootstrap
 from analysis.bootstrap import (
+    BLOCK,
     interval,
     median,
     median_intervals,
@@ -32,11 +33,21 @@ def test_every_resample_draws_as_many_people_as_there_are():
     assert seen == pytest.approx(stats.binom.pmf(range(5), 17, 1 / 17), abs=0.02)
 
 
-def test_chunks_change_nothing(monkeypatch):
+def test_draws_hang_on_their_number_alone(monkeypatch):
+    """Not on how many are drawn, what is kept, or where drawing begins."""
     whole = weights(50, 200, seed=3)
-    monkeypatch.setattr(bootstrap, "CHUNK", 50 * 7)
+    assert np.array_equal(weights(50, BLOCK + 5, seed=3), whole[: BLOCK + 5])
     monkeypatch.setattr(bootstrap, "KEPT", 0)
     assert np.array_equal(weights(50, 200, seed=3), whole)
+    spawned = np.random.SeedSequence([3, 50]).spawn(2)[1]
+    people = np.random.default_rng(spawned).integers(0, 50, (BLOCK, 50), dtype=np.int32)
+    assert np.array_equal(np.bincount(people[0], minlength=50), whole[BLOCK])
+
+
+def test_counts_of_some_resamples_are_those_of_all(crowd):
+    panel, options = crowd(12, [0, 0.4, 1], seed=1), Options(resamples=100, seed=5)
+    some = bootstrap.counts_between(panel, options, 2 * BLOCK, 200)
+    assert some.tobytes() == bootstrap.counts(panel, options)[2 * BLOCK :].tobytes()
 
 
 def test_counts_are_those_of_the_people_drawn(crowd):

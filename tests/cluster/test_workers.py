@@ -9,11 +9,16 @@ from concurrent.futures import wait
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
+from analysis import responses_from_records
+from analysis.compute import everything
 from analysis.errors import InputError
+from analysis.options import Options
 from analysis.planning import Plan, plan_table
 from analysis.planning.power import PART
+from analysis.worth.resampled import FITTED
 from app.workers import MOST_LOSSES, THREADS, crew
 from renderer.optics import montecarlo
 
@@ -134,6 +139,27 @@ def test_power_by_two_processes_is_that_of_one():
         shared = plan_table(plan, executor=made.executor)
     for here, there in zip(alone, shared, strict=True):
         assert here.to_csv() == there.to_csv()
+
+
+def test_the_bootstrap_by_two_processes_is_that_of_one(tmp_path):
+    """Of one technique that hardly ever loses too: a resample without a maximum."""
+    rng = np.random.default_rng(4)
+    rows = [
+        (f"p{person}", "near", a, b, int(answer))
+        for person in range(14)
+        for a, b, worth in (("x", "y", 0.2), ("x", "z", 1.8), ("y", "z", 0.6))
+        for answer in np.clip(np.round(rng.normal(worth, 0.8, 1)), -2, 2)
+    ]
+    columns = ("participant", "framing", "left", "right", "answer")
+    records = [dict(zip(columns, row)) for row in rows]
+    options = Options(resamples=FITTED + 40)
+    alone = everything(responses_from_records(records), options).tables
+    with crew(workers=2) as made:
+        responses = responses_from_records(records)
+        shared = everything(responses, options, executor=made.executor, folder=tmp_path).tables
+    assert alone.keys() == shared.keys() and not list(tmp_path.iterdir())
+    for name, table in alone.items():
+        assert table.to_csv() == shared[name].to_csv(), name
 
 
 def test_one_kind_of_workers_is_asked_for():
