@@ -136,28 +136,15 @@ class Studio:
         result = frame.render(stimulus.parameters)
         digest = write_png(out / stimulus.file, result.image, render.size)
         _write_mask(out / manifest.MASKS / f"{stimulus.cell.name}.png", result.samples, render)
-        further = {k: v for k, v in stimulus.cell.levels.items() if k != FRAMING}
-        region = tuple(stimulus.scene.camera.region)
-        image = {
-            "framing": stimulus.cell.framing,
-            **({"levels": further} if further else {}),
-            "technique": stimulus.condition,
-            "file": stimulus.file,
-            "width": render.size[0],
-            "height": render.size[1],
-            **({"region": list(region)} if region != WHOLE else {}),
-            "sha256": digest,
-            "parameters": {
-                "technique": stimulus.technique,
-                "supersample": render.supersample,
-                **_jsonable(stimulus.parameters),
-            },
-            "scene": described(stimulus.scene),
-            "seed": render.seed,
-            "measures": {"samples_per_pixel": samples_per_pixel(result.samples)},
-            "renderer": {**drawing.info(), "commit": task.commit},
-            "head": self._staged.provenance,
-        }
+        image = entry(
+            stimulus,
+            render,
+            digest,
+            samples_per_pixel(result.samples),
+            drawing.info(),
+            task.commit,
+            self._staged.provenance,
+        )
         done = {
             "key": stimulus.key,
             "image": image,
@@ -165,6 +152,42 @@ class Studio:
             "notes": list(self._staged.notes),
         }
         records.write(out, stimulus.file, done)
+
+
+def entry(
+    stimulus: Stimulus,
+    render: Render,
+    digest: str,
+    samples: float,
+    driver: dict,
+    commit: str | None,
+    head: dict,
+) -> dict:
+    """What the manifest says of an image: digest, the sha256 of its file; samples: the mean a pixel
+    that scatters; head: where its objects came from.
+    """
+    further = {k: v for k, v in stimulus.cell.levels.items() if k != FRAMING}
+    region = tuple(stimulus.scene.camera.region)
+    return {
+        "framing": stimulus.cell.framing,
+        **({"levels": further} if further else {}),
+        "technique": stimulus.condition,
+        "file": stimulus.file,
+        "width": render.size[0],
+        "height": render.size[1],
+        **({"region": list(region)} if region != WHOLE else {}),
+        "sha256": digest,
+        "parameters": {
+            "technique": stimulus.technique,
+            "supersample": render.supersample,
+            **_jsonable(stimulus.parameters),
+        },
+        "scene": described(stimulus.scene),
+        "seed": render.seed,
+        "measures": {"samples_per_pixel": samples},
+        "renderer": {**driver, "commit": commit},
+        "head": head,
+    }
 
 
 _studio = Studio()
