@@ -202,6 +202,7 @@ class Frame:
             ),
             piece.first,
             self.height,
+            r.executor,
         )
 
     def pieces(self, technique: Technique) -> list[Piece]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from typing import Self
 
 import numpy as np
@@ -40,7 +41,8 @@ class Renderer:
 
     scene: a renderer.scene.graph.SceneGraph, or any pyrender.Scene. size: (width, height) of the
     images; supersample: 1 to 4 samples a pixel along each side; seed: of the solid noise and of
-    the baked light; rays: of the bake, per vertex; shadow_map: pixels of a lamp's map.
+    the baked light; rays: of the bake, per vertex; shadow_map: pixels of a lamp's map; executor:
+    walks for the technique `reference`, without it this process does.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class Renderer:
         seed: int = 0,
         rays: int = 144,
         shadow_map: int = SHADOW_MAP,
+        executor: Executor | None = None,
     ):
         width, height = size
         if min(width, height) < 16 or max(width, height) * supersample > SIZE_LIMIT:
@@ -64,6 +67,7 @@ class Renderer:
         if not contents.surfaces:
             raise InputError("the scene has no surface; expected at least one mesh")
         self.scene, self.size, self.supersample, self.seed = scene, size, supersample, seed
+        self.executor = executor
         give_back_large()
         give_back()  # what the making of the scene has freed
         self.context = gl.Context()

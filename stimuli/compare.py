@@ -8,6 +8,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -129,19 +130,24 @@ def compare(
     options: Options,
     distances: Distances,
     against: Mapping[str, Any] | None = None,
+    executor: Executor | None = None,
 ) -> list[Shot]:
     """Every technique at every framing ("": the scene's own camera), beside the reference, or
-    beside the one technique that is named in `against`.
+    beside the one technique that is named in `against`. executor: walks for the reference.
     """
     table = merge(load_table(scene), patch)
     return [
         _shot(name, frame, lights, techniques, options, distances, against)
-        for name, frame, lights in framed(scene, table, framings, options)
+        for name, frame, lights in framed(scene, table, framings, options, executor)
     ]
 
 
 def framed(
-    scene: str | Path, table: dict, framings: Sequence[str], options
+    scene: str | Path,
+    table: dict,
+    framings: Sequence[str],
+    options,
+    executor: Executor | None = None,
 ) -> Iterator[tuple[str, Any, list]]:
     """Each framing ("": the scene's own camera; FRAMING/ANGLE: from another side) of a scene's
     table, its frame while it is open, and the scene's lamps. options: its size, supersample and
@@ -156,7 +162,11 @@ def framed(
     staged = stage(next(iter(scenes.values())), options.seed)
     lights = graphs.contents(staged.graph).lights
     with renderer.Renderer(
-        staged.graph, size=options.size, supersample=options.supersample, seed=options.seed
+        staged.graph,
+        size=options.size,
+        supersample=options.supersample,
+        seed=options.seed,
+        executor=executor,
     ) as drawing:
         if not drawing.media:
             raise InputError(f"{scene}: nothing scatters in it; expected a material with a medium")

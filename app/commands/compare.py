@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from app import drawing
+from app import workers as working
 from app.commands.media import writable
 
 LAYERED = (
@@ -126,8 +127,21 @@ def _crop(_context, _parameter, value: str | None):
     show_default=True,
     help="Pixels of the sheet for a pixel, along each side.",
 )
+@working.options
 def command(
-    scene, techniques, against, framings, crop, patches, out, table, columns, zoom, **options
+    scene,
+    techniques,
+    against,
+    framings,
+    crop,
+    patches,
+    out,
+    table,
+    columns,
+    zoom,
+    workers,
+    cluster,
+    **options,
 ) -> None:
     """Say how far techniques are from the truth in SCENE, a name of stimuli/scenes or a TOML file.
 
@@ -148,7 +162,11 @@ def command(
     if other and len(other) != 1:
         raise InputError(f"--against is {against!r}; expected one technique")
     settings = Options(crop=crop, **options)
-    shots = compare(scene, patches, framings or [""], chosen(techniques), settings, MAPS, other)
+    with working.crew(workers, cluster) as crew:
+        shots = compare(
+            *(scene, patches, framings or [""], chosen(techniques), settings, MAPS, other),
+            crew.executor,
+        )
     for shot in shots:
         if other:
             click.echo(f"{shot.framing}: against {shot.truth}")

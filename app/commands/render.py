@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from app import drawing
+from app import workers as working
 
 
 def parameters_of(_context, _parameter, values: tuple[str, ...]) -> dict:
@@ -88,6 +89,7 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     type=click.Path(dir_okay=False, path_type=Path),
     help="Also write the local contrast as a grey PNG (golubev_plus).",
 )
+@working.options
 def command(
     technique,
     framing,
@@ -102,6 +104,8 @@ def command(
     seed,
     samples,
     contrast,
+    workers,
+    cluster,
 ):
     """Render one technique in one scene.
 
@@ -116,6 +120,8 @@ def command(
     from stimuli.study import with_head
 
     chosen = renderer.make(technique, parameters)
+    if (workers or cluster) and technique != "reference":
+        raise click.UsageError(f"{technique} is drawn by this process; expected no workers")
     table = merge(load_table(scene), patches)
     if framing:
         if framing not in renderer.FRAMINGS:
@@ -136,7 +142,14 @@ def command(
     for note in staged.notes:
         click.echo(note, err=True)
     with (
-        renderer.Renderer(staged.graph, size=size, supersample=supersample, seed=seed) as drawing,
+        working.crew(workers, cluster) as crew,
+        renderer.Renderer(
+            staged.graph,
+            size=size,
+            supersample=supersample,
+            seed=seed,
+            executor=crew.executor,
+        ) as drawing,
         drawing.frame() as frame,
     ):
         result = frame.render(chosen)

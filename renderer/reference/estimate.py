@@ -7,7 +7,8 @@ import json
 import os
 import time
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -17,7 +18,9 @@ import numpy as np
 from renderer import caches
 from renderer.optics import chandrasekhar, media
 from renderer.optics.medium import Medium, Stack
-from renderer.reference.walk import Solid, walk
+from renderer.reference.blocks import Block, Start, blocks
+from renderer.reference.blocks import walked as walked_blocks
+from renderer.reference.walk import Solid, Walks
 from renderer.scene.shapes import points_on
 
 BLOCK = 60_000  # walks of a channel that are on their way together
@@ -132,27 +135,45 @@ def estimate(
     walks: int,
     seed: int,
     keep: bool = True,
+    executor: Executor | None = None,
 ) -> Halves:
     """Scattered irradiance at points (N, 3) on a solid, by `walks` walks a point and channel, even.
 
     As techniques give it: what leaves over what a half-space sends back, so that constant light on
     a flat slab stays as it is and the surface's own albedo is multiplied on later. index (N,):
     a number of each point, which decides its walks together with the seed. What takes longer than
-    SAVE_EVERY_S is kept in the cache while it runs (`keep`), and taken up from there.
+    SAVE_EVERY_S is kept in the cache while it runs (`keep`), and taken up from there. executor:
+    walks, in processes that see the cache, while this one looks up their light; the same to the
+    bit.
     """
     half, channels = walks // 2, medium.medium.channels
     sums = np.zeros((2, 2, len(points), channels))  # under the light and under 1, by half
     # so many walks of a point at a time that small pictures fill a block too
     together = max(1, min(half, BLOCK // max(2 * len(points), 1)))
     name = f"{_key(solid, medium.medium, points, index, light, seed)}-{walks}" if keep else None
+    start = Start(solid.parts, medium.medium, points, normals, index, seed)
+    ahead: Iterator[list[Walks]] | None = None
+
+    def all_from(done: int) -> Iterator[Block]:
+        for first in range(done, half, together):
+            yield from blocks(len(points), first, min(together, half - first), BLOCK)
 
     def add(done: int, count: int) -> None:
-        _add(sums, solid, medium.medium, points, normals, index, light, done, count, seed)
+        nonlocal ahead
+        if ahead is None:
+            folder = caches.folder() / "reference"
+            ahead = walked_blocks(start, solid, executor, all_from(done), folder)
+        for block in blocks(len(points), done, count, BLOCK):
+            _add(sums, *block.walks(len(points)), next(ahead), light)
 
     def halves(done: int) -> Halves:
         return Halves(*sums / (done * medium.albedo), done)
 
-    accumulate(name, sums, half, together, add, halves, "walk")
+    try:
+        accumulate(name, sums, half, together, add, halves, "walk")
+    finally:
+        if ahead is not None:
+            ahead.close()
     return halves(half)
 
 
@@ -206,40 +227,24 @@ def accumulate(
 
 
 def _add(
-    sums: np.ndarray,
-    solid: Solid,
-    medium: Medium,
-    points: np.ndarray,
-    normals: np.ndarray,
-    index: np.ndarray,
-    light: Light,
-    done: int,
-    count: int,
-    seed: int,
+    sums: np.ndarray, place: np.ndarray, number: np.ndarray, walks: list[Walks], light: Light
 ) -> None:
-    """Add to the sums of both halves what `count` further walks a point and half find."""
-    numbers = np.arange(2 * done, 2 * (done + count))
-    total = len(points) * len(numbers)
-    channels = range(medium.channels)
-    for start in range(0, total, BLOCK):
-        which = np.arange(start, min(start + BLOCK, total))
-        place, number = which // len(numbers), numbers[which % len(numbers)]
-        names = index[place].astype(np.uint64) * np.uint64(65536) + number.astype(np.uint64)
-        walks = [
-            walk(solid, medium, c, points[place], normals[place], names, [seed]) for c in channels
-        ]
-        triangles = np.concatenate([w.triangle for w in walks])
-        if not len(triangles):
-            continue
-        lit = light(triangles, np.concatenate([w.weights for w in walks]))
-        begin = 0
-        for c, w in enumerate(walks):
-            arrived = w.carried * lit[begin : begin + len(w.carried), c]
-            begin += len(w.carried)
-            where = 2 * place[w.source] + number[w.source] % 2
-            for sum_, of in zip(sums, (arrived, w.carried)):
-                counted = np.bincount(where, of, 2 * len(points))
-                sum_[:, :, c] += counted.reshape(-1, 2).T
+    """Add to the sums of both halves what a block's walks bring, of each channel: walk w is that of
+    point place[w] and of number[w], whose parity is its half.
+    """
+    points = sums.shape[2]
+    triangles = np.concatenate([w.triangle for w in walks])
+    if not len(triangles):
+        return
+    lit = light(triangles, np.concatenate([w.weights for w in walks]))
+    begin = 0
+    for c, w in enumerate(walks):
+        arrived = w.carried * lit[begin : begin + len(w.carried), c]
+        begin += len(w.carried)
+        where = 2 * place[w.source] + number[w.source] % 2
+        for sum_, of in zip(sums, (arrived, w.carried)):
+            counted = np.bincount(where, of, 2 * points)
+            sum_[:, :, c] += counted.reshape(-1, 2).T
 
 
 def _over_cells(points: np.ndarray, values: np.ndarray, cell_mm: float) -> np.ndarray:
@@ -274,7 +279,7 @@ def _key(
     rng = np.random.default_rng(0)
     probes = light(*points_on(areas, (np.arange(PROBES) + 0.5) / PROBES, rng))
     digest = hashlib.sha256()
-    for name in ("walk.py", "estimate.py"):
+    for name in ("walk.py", "blocks.py", "estimate.py"):
         digest.update(Path(__file__).with_name(name).read_bytes())
     for array in (solid.corners, solid.middle, points, index, probes):
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -37,11 +37,13 @@ class Part:
 class Solid:
     """Surfaces that bound one medium, as rays see them; triangles are numbered through all parts.
 
-    normals (M, 3): outward, of the triangles; starts: the number of each part's first triangle;
-    middle (3,): what `corners` (M, 3, 3) and rays are relative to; bounds (3,): half its size.
+    parts: the surfaces; normals (M, 3): outward, of the triangles; starts: the number of each
+    part's first triangle; middle (3,): what `corners` (M, 3, 3) and rays are relative to; bounds
+    (3,): half its size.
     """
 
     def __init__(self, parts: Sequence[Part]):
+        self.parts = tuple(parts)
         corners = [np.asarray(p.positions, float)[np.asarray(p.faces, int)] for p in parts]
         self.starts = np.cumsum([0] + [len(c) for c in corners])
         triangles = np.concatenate(corners)

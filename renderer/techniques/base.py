@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -34,7 +35,7 @@ class Inputs:
     depth in mm (0 where nothing is). pixels_per_mm: pixels of this resolution per mm at 1 mm
     distance. supersample: pixels of this resolution per output pixel, along one side. curve: the
     medium's reference curve. room: the surfaces of the medium themselves, for techniques that work
-    over another domain than the screen.
+    over another domain than the screen. executor: for work that does not draw, None: this process.
     """
 
     context: object
@@ -49,6 +50,7 @@ class Inputs:
     room: Room | None = None
     first_row: int = 0
     image_height: int = 0
+    executor: Executor | None = None
 
     @property
     def image_size(self) -> tuple[int, int]:

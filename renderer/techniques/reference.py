@@ -128,6 +128,7 @@ class Reference(Technique):
             lambda triangles, weights: self._light(room, solid, triangles, weights, point_mm),
             self.walks,
             self.seed,
+            executor=inputs.executor,
         )
         if self.pool_mm:
             halves = halves.pooled(points[seen], own[seen], self.pool_mm)
@@ -138,6 +139,11 @@ class Reference(Technique):
 
     def _traced(self, inputs: Inputs, where: np.ndarray, solid: Solid, medium: Walked) -> Halves:
         """By light that is traced from where it comes from."""
+        if inputs.executor is not None:
+            raise InputError(
+                "reference.light is 'traced' with workers; expected 'given', or no workers: light "
+                "is traced by one process"
+            )
         room = inputs.needed_room(self.name)
         point_mm = float(np.ptp(solid.corners)) / 1000
 

@@ -21,6 +21,9 @@ from analysis.planning.power import PART
 from analysis.worth.resampled import FITTED
 from app.workers import MOST_LOSSES, THREADS, crew
 from renderer.optics import montecarlo
+from renderer.reference import estimate as estimates
+from renderer.reference.walk import Part, Solid
+from renderer.scene.shapes import slab
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Writes a file in each of two processes for ever; Ctrl-C ends it.
@@ -160,6 +163,23 @@ def test_the_bootstrap_by_two_processes_is_that_of_one(tmp_path):
     assert alone.keys() == shared.keys() and not list(tmp_path.iterdir())
     for name, table in alone.items():
         assert table.to_csv() == shared[name].to_csv(), name
+
+
+def test_a_reference_by_two_processes_is_that_of_one(monkeypatch, tmp_path):
+    """Of several blocks a step and several steps, and what is handed over is taken away."""
+    monkeypatch.setenv("SUBDERMAL_CACHE", str(tmp_path))
+    monkeypatch.setattr(estimates, "BLOCK", 700)
+    bar = slab((6.0, 4.0, 4.0))
+    solid = Solid([Part(bar.positions, bar.faces)])
+    x = np.linspace(-2, 2, 500)
+    points, normals = np.column_stack([x, 0 * x, 2 + 0 * x]), np.tile([0.0, 0.0, 1.0], (500, 1))
+    light = lambda triangle, weights: np.column_stack([weights[:, 0]] * 3) + triangle[:, None]
+    rest = (points, normals, np.arange(500), light, 6, 1, False)
+    alone = estimates.estimate(solid, estimates.walked("skin1"), *rest)
+    with crew(workers=2) as made:
+        shared = estimates.estimate(solid, estimates.walked("skin1"), *rest, made.executor)
+    assert shared.values.tobytes() == alone.values.tobytes() and alone.values.std() > 0
+    assert not list((tmp_path / "reference").iterdir())
 
 
 def test_one_kind_of_workers_is_asked_for():
