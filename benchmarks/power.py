@@ -107,7 +107,8 @@ def main() -> int:
         fresh = Plan(
             TECHNIQUES, PAIR, framings=FRAMINGS, options=options, studies=1000, most=people
         )
-        run = Studies(fresh, "full", difference, np.random.default_rng(given.seed))
+        truth = dict.fromkeys(FRAMINGS, difference)
+        run = Studies(fresh, "full", truth.__getitem__, np.random.default_rng(given.seed))
         decisions = (run.detected if goal == "find" else run.excluded)(
             people
         )  # (studies, framings)

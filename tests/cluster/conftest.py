@@ -87,5 +87,5 @@ def here(study, tmp_path_factory, contents):
     out = tmp_path_factory.mktemp("here")
     build(load_study(study), out)
     files = contents(out)
-    assert len(files) == 8 + 8 + 1  # images, their records, the manifest
+    assert len(files) == 8 + 8 + 4 + 1  # images, their records, a mask a cell, the manifest
     return files

@@ -71,7 +71,7 @@ def test_two_builds_with_one_seed_give_the_same_bytes(thesis_in_small, folder, t
     assert names == sorted(
         path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()
     )
-    assert len(names) == 15 + 15 + 1  # images, their records, the manifest
+    assert len(names) == 15 + 15 + 3 + 1  # images, their records, a mask a cell, the manifest
     assert not [
         name for name in names if (folder / name).read_bytes() != (tmp_path / name).read_bytes()
     ]
