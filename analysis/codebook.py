@@ -11,7 +11,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from analysis.errors import InputError
-from analysis.manifest import FAMILIARITY, ManifestFile, open_manifest, read_self_rating
+from analysis.manifest import (
+    FAMILIARITY,
+    ManifestFile,
+    credit,
+    open_manifest,
+    read_self_rating,
+)
 
 #: The factor that answers are grouped by when none is chosen.
 FRAMING = "framing"
@@ -146,11 +152,7 @@ def read_manifest(path: str | Path | ManifestFile) -> Codebook:
     codebook = of_study(
         manifest.study, f"{manifest.path}: study", f"the study's ({manifest.path.name})"
     )
-    credits = [
-        f"{one.get('what')} ({', '.join(str(one[k]) for k in ('credit', 'licence') if k in one)})"
-        for one in manifest.licences
-    ]
-    return replace(codebook, made_from=tuple(dict.fromkeys(credits)))
+    return replace(codebook, made_from=tuple(dict.fromkeys(map(credit, manifest.licences))))
 
 
 def of_study(study: Mapping, where: str = "study", rule: str = "the study's") -> Codebook:

@@ -133,6 +133,12 @@ class ManifestFile:
         return read_measures(f"{self.path}: images[{place}].measures", measures or {})
 
 
+def credit(licence: Mapping[str, object]) -> str:
+    """What an entry of `licences` says: 'a bust (A. Maker, CC-BY-4.0)'."""
+    of = ", ".join(str(licence[key]) for key in ("credit", "licence") if key in licence)
+    return f"{licence.get('what')} ({of})"
+
+
 def is_manifest(path: Path) -> bool:
     """Whether the file is a subdermal manifest of any version, whole or not; other tools write a
     `manifest.json` too.

@@ -12,6 +12,7 @@ from typing import Any
 
 from babel.support import NullTranslations
 
+from analysis.manifest import credit
 from app.catalogues import catalogue, message
 from stimuli.manifest import Image, Manifest, load_manifest
 from stimuli.study import Study as Definition
@@ -94,6 +95,12 @@ class Study:
         """
         # the key is that of the first databases, in which a cell was a framing
         return json.dumps({"framings": self.cells, "techniques": self.techniques})
+
+    @property
+    def credits(self) -> tuple[str, ...]:
+        """Whose the images' sources are, of those that ask to be named."""
+        named = (one for one in self.manifest.licences if "credit" in one)
+        return tuple(dict.fromkeys(map(credit, named)))
 
     def content(self, *, images: bool) -> dict:
         """What participants see: the study's words and levels, and its images by their hashes."""

@@ -409,7 +409,10 @@ def thanks():
         with database().read() as db:
             participant = _participant(db)
     return render_template(
-        "questionnaire/thanks.html", participant=participant, back=_back(participant)
+        "questionnaire/thanks.html",
+        participant=participant,
+        back=_back(participant),
+        credits=study().credits,
     )
 
 

@@ -1,5 +1,6 @@
 """What a participant can do, and what must not happen: a lost, doubled or overwritten answer."""
 
+import json
 import re
 from concurrent.futures import ThreadPoolExecutor
 
@@ -23,6 +24,22 @@ def test_thirty_answers_from_consent_to_code(person):
     assert somebody.path == "/thanks"
     assert re.search(r'id="completion-code">[A-Z2-9]{10}<', somebody.page.text)
     assert somebody.answers == values
+
+
+def test_whose_the_images_sources_are_is_said_at_the_end(write_study, tmp_path):
+    folder = write_study(tmp_path / "credited")
+    record = json.loads((folder / "manifest.json").read_text())
+    record["licences"] = [
+        {"what": "a bust", "licence": "CC-BY-4.0", "source": "there", "credit": "<b>A. Maker</b>"},
+        {"what": "a base mesh", "licence": "CC0-1.0", "source": "here"},
+    ]
+    (folder / "manifest.json").write_text(json.dumps(record))
+    credited = create_app(folder)
+    somebody = Person(credited).begin()
+    while somebody.path == "/question":
+        somebody.answer(0)
+    assert "a bust (&lt;b&gt;A. Maker&lt;/b&gt;, CC-BY-4.0)." in somebody.page.text
+    assert "base mesh" not in somebody.page.text
 
 
 def test_trials_are_those_of_the_design_and_recorded(app, person):
