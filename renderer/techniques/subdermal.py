@@ -38,6 +38,9 @@ PAD = 1 << LEVELS  # so that every mean is one of whole pixels
 RUNG = 1.3  # between the sizes of a pixel for which sets are fitted
 #: Taps of a ring are means over texels whose side falls with their number to this power.
 NARROWER = 0.5
+#: fewest, by_spread, by_unguarded of `preset`: golubev's error with 22 samples over the skin of the
+#: thesis's scene; two thirds of it (docs/subdermal.md, where other media are too).
+PRESETS = {"equal_error": (3.0, 3.0, 50.0), "safe": (5.0, 20.0, 80.0)}
 LEAST = 1e-30  # of a profile: what lies farther out has no weight that floats can hold
 
 
@@ -50,6 +53,9 @@ class Subdermal(BurleyFilter):
     profile; "curve": to the medium's own curve, which few profiles of one parameter can be.
     """
 
+    preset: str = parameter(
+        "own", choices=("own", *PRESETS), source="own: the three numbers below; else PRESETS"
+    )
     fewest: float = parameter(3.0, unit="taps", low=3.0, high=31.0, source="docs/subdermal.md")
     by_spread: float = parameter(
         10.0, unit="taps, of a relative spread of 1", low=0.0, high=1e3, source="docs/subdermal.md"
@@ -92,6 +98,12 @@ class Subdermal(BurleyFilter):
     name: ClassVar[str] = "subdermal"
     title: ClassVar[str] = "Subdermal"
     paper: ClassVar[str] = "ours, docs/subdermal.md"
+
+    @property
+    def counting(self) -> tuple[float, float, float]:
+        """fewest, by_spread and by_unguarded, or the preset's."""
+        own = (self.fewest, self.by_spread, self.by_unguarded)
+        return PRESETS.get(self.preset, own)
 
     def sets(self, curve: Curve, rung: int) -> list[rings.Rings]:
         """The fitted rings of every set, for pixels RUNG^rung mm wide."""
@@ -153,7 +165,7 @@ class Subdermal(BurleyFilter):
                     tiles=tiles.textures[0],
                     tile_depths=tiles.textures[1],
                     sigma_mm=self.neighbourhood * float(d.max()),
-                    by=(self.fewest, self.by_spread, self.by_unguarded),
+                    by=self.counting,
                     full_spread=self.full_spread,
                     counts=np.array(COUNTS, float),
                     ladder=(first, np.log(RUNG)),

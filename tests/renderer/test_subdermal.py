@@ -109,3 +109,19 @@ def test_a_filter_narrower_than_a_pixel_leaves_light_as_it_is(bare):
     out, count = scatter(renderer.make("subdermal"), bare.flat(light, SKIN, 40000.0, 1800.0))
     np.testing.assert_array_equal(out, light.astype(np.float32))
     assert (count[..., 0] == 1).all()
+
+
+def test_a_preset_is_its_three_numbers(bare):
+    inputs = replace(bare.flat(relief(), SKIN, DEPTH, SCALE), supersample=2)
+    counts = {}
+    for name, given in {
+        "safe": {"preset": "safe"},
+        "numbers": {"fewest": 5.0, "by_spread": 20.0, "by_unguarded": 80.0},
+        "equal": {"preset": "equal_error"},
+        "own": {},
+    }.items():
+        out, count = scatter(renderer.make("subdermal", given), inputs)
+        counts[name] = out, count[..., 0]
+    np.testing.assert_array_equal(counts["safe"][0], counts["numbers"][0])
+    means = [counts[name][1].mean() for name in ("equal", "own", "safe")]
+    assert means == sorted(means) and len({*means}) == 3
