@@ -12,6 +12,7 @@ import argparse
 from tqdm import tqdm
 
 from app.simulation.designs import compare
+from stimuli.asking import Assignment
 
 #: Techniques, pairs a person, studies.
 SIZES = ((5, 5, 200), (10, 22, 60), (20, 32, 20))
@@ -24,6 +25,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--studies", type=int, help="of each row; by default 200, 60 and 20")
     parser.add_argument("--items", type=int, action="append", help="rows of these alone")
+    parser.add_argument("--as-good", type=float, default=Assignment.as_good)
     given = parser.parse_args()
     rows = [
         (items, spread, pairs, given.studies or studies)
@@ -37,7 +39,9 @@ def main() -> None:
         "|---|---|---|---|---|---|---|---|---|"
     )
     for items, spread, pairs, studies in tqdm(rows, disable=None):
-        one = compare(items, spread, given.people, pairs, studies, given.seed)
+        one = compare(
+            items, spread, given.people, pairs, studies, given.seed, as_good=given.as_good
+        )
         gains = ["{:.2f} ({:.2f} to {:.2f})".format(*gain) for gain in (one.gain, one.near_gain)]
         print(
             f"| {items} | {spread:g} | {pairs} | {one.error[0]:.2f}, {one.error[1]:.2f} | "
