@@ -2,6 +2,7 @@
 nothing comes back as markup, nothing that was answered changes.
 """
 
+import json
 import random
 import re
 import socket
@@ -11,7 +12,7 @@ import pytest
 from sqlalchemy import func, select
 
 from app import create_app, export, security
-from app.models import Event, Participant, Response
+from app.models import Event, Link, LogEntry, Note, Participant, Response, Statement
 from app.server import running
 
 VALUES = (
@@ -39,34 +40,39 @@ VALUES = (
     "[]",
     '{"a": [1]}',
 )
-#: What the application reads of forms, and what its pages send beside.
+APP = Path(security.__file__).parent
+#: What the application reads of forms, and what its pages send: a new one is tried by itself.
 FIELDS = sorted(
-    {
-        "quota",
-        "minutes",
-        "rt_ms",
-        "view",
-        "beside_ms",
-        "pixel_scale",
-        "viewport_width",
-        "device_pixel_ratio",
-    }
+    {"rt_ms", "view", "beside_ms", "pixel_scale", "viewport_width", "device_pixel_ratio"}
     | {
         name
-        for path in Path(security.__file__).parent.rglob("*.py")
-        for name in re.findall(
-            r'(?:form\.get\(|form\[|_integer\(|_number\()"(\w+)"', path.read_text()
+        for paths, pattern in (
+            (
+                APP.rglob("*.py"),
+                r'(?:form\.get\(|form\[|_(?:integer|number)\((?:[\w.]+, )?)"(\w+)"',
+            ),
+            ((APP / "templates").rglob("*.html"), r'\sname="(\w+)"'),
         )
+        for path in paths
+        for name in re.findall(pattern, path.read_text())
     }
+    - {"csrf_token", "viewport"}
 )
 HEADERS = ("Accept", "Accept-Language", "Referer", "Origin", "X-Forwarded-For", "Content-Type")
-REQUESTS = 250
+#: To each address and method, so that a new one is tried by itself.
+REQUESTS = 3
 
 
 def addresses(app, draw):
-    rule = draw.choice(list(app.url_map.iter_rules()))
-    path = re.sub(r"<[^>]+>", lambda _: draw.choice(VALUES).replace("?", ""), rule.rule)
-    return path, draw.choice(sorted(rule.methods - {"HEAD", "OPTIONS"}))
+    """Every address of the application with every method that it takes, in a random order."""
+    rules = [
+        (rule.rule, method)
+        for rule in app.url_map.iter_rules()
+        for method in sorted(rule.methods - {"HEAD", "OPTIONS"})
+    ] * REQUESTS
+    draw.shuffle(rules)
+    for rule, method in rules:
+        yield re.sub(r"<[^>]+>", lambda _: draw.choice(VALUES).replace("?", ""), rule), method
 
 
 @pytest.mark.parametrize("who", ["stranger", "participant", "researcher"])
@@ -78,8 +84,8 @@ def test_nonsense_fails_nowhere(app, person, experimenter, who):
     token = re.search(r'name="csrf_token" value="([^"]+)"', page)[1]
     draw = random.Random(who)
     before = rows(app)
-    for _ in range(REQUESTS):
-        path, method = addresses(app, draw)
+    assert {"trial", "answer", "familiarity", "reason", "code", "state"} <= set(FIELDS)
+    for path, method in addresses(app, draw):
         if path in ("/dashboard/logout", "/another"):
             continue
         form = {name: draw.choice(VALUES) for name in draw.sample(FIELDS, 6)}
@@ -142,9 +148,44 @@ def test_no_cell_of_a_table_is_a_formula(app, person, experimenter):
     assert '"reason_text": "=1+1"' in experimenter.get("/dashboard/responses.jsonl").text
     experimenter.get("/dashboard/participants/P0001")
     experimenter.send("reason", reason='=HYPERLINK("http://evil.example")')
-    for name in ("responses", "participants", "completions", "log", "codebook", "recruits"):
-        text = experimenter.get(f"/dashboard/{name}.csv").text
-        assert not re.search(r'(?:^|,)"?(?:[=+@\t]|-1\+1)', text, re.M), name
+    tables = {rule.rule for rule in app.url_map.iter_rules() if rule.rule.endswith(".csv")}
+    assert {"/dashboard/responses.csv", "/dashboard/log.csv"} <= tables
+    for table in tables:
+        text = experimenter.get(table).text
+        assert not re.search(r'(?:^|,)"?(?:[=+@\t]|-1\+1)', text, re.M), table
+
+
+def test_markup_that_is_stored_comes_back_as_text(app, person, experimenter):
+    """Whatever texts are in the database, every page of a researcher shows them as text."""
+    markup = "<script>alert(1)</script><img src=x onerror=alert(1)>"
+    somebody = person().begin().answer(*[0] * 30)
+    experimenter.get("/dashboard/participants/P0001")
+    experimenter.send("reason", reason=markup)
+    with app.extensions["database"].write() as db:
+        db.add_all(
+            [Link(token="T" * 16, label=markup), Note(participant_id=1, who="a", text=markup)]
+        )
+        db.add(Statement(participant_id=1, name="own", value=markup))
+        db.add(LogEntry(who=markup, action="a", detail=markup))
+        for row in db.scalars(select(Response)):
+            row.reason_text = markup
+        db.get(Participant, 1).recruit = json.dumps({"PROLIFIC_PID": markup})
+    shown = 0
+    for rule in app.url_map.iter_rules():
+        if "GET" not in rule.methods or rule.endpoint in ("static", "web.static"):
+            continue
+        path = rule.rule.replace("<code>", "P0001")
+        for visitor in (experimenter, somebody):
+            reply = visitor.http.get(path)
+            if "html" in (reply.content_type or "") or path.endswith("live.json"):
+                text = (
+                    reply.json["html"]
+                    if path.endswith("live.json") and reply.is_json and "html" in reply.json
+                    else reply.text
+                )
+                assert "<script>alert" not in text and "<img src=x" not in text, path
+                shown += "&lt;script&gt;alert" in text
+    assert shown  # it was looked for where it is
 
 
 def test_a_body_that_never_ends_and_one_that_is_too_long_cost_nobody_a_place(study_dir):
