@@ -13,6 +13,7 @@ from renderer import gl
 from renderer.gl import GL
 from renderer.memory import give_back
 from renderer.optics.transmittance import Translucency
+from renderer.passes import occlusion
 from renderer.passes.composite import composite
 from renderer.passes.given import draw_given
 from renderer.passes.pieces import Piece, pieces
@@ -92,9 +93,13 @@ class Frame:
 
     def _draw_hair(self) -> None:
         r = self.renderer
+        if not r.hair:
+            return
+        depths = occlusion.blocks(self.surface.textures[3].read()[::-1, :, 0])
         self.surface.bind(depth_test=True, blend="over", only=1)
+        sources = (r.program, r.lamps, r.surroundings, self._shared, self.view.pixels_per_mm)
         for hair in r.hair:
-            hair.draw(r.program, r.lamps, r.surroundings, self._shared, self.view.pixels_per_mm)
+            hair.draw(*sources, (self.width, self.height), depths)
 
     def _irradiance(self, diffuse: str) -> gl.Texture:
         """Irradiance below a face of that model, alpha the medium's id."""

@@ -81,6 +81,8 @@ class Renderer:
             everything = np.vstack(points)
             self.lamps = Lamps(contents.lights, everything, shadow_map)
             self._draw_shadows()
+            for hair in self.hair:
+                hair.light(self.context, self.program, self.lamps, self.surroundings)
         except BaseException:
             self.close()
             raise

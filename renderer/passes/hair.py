@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from renderer import gl
+from renderer.gl import GL
+from renderer.passes import occlusion
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
 from renderer.passes.surfaces import Drawn
@@ -16,6 +18,7 @@ from renderer.scene.lights import DistantLight, Light
 EXTINCTION = 1.5  # of the whole layer of hair along its normal
 SHADOW_WIDTH_MM = 0.16  # of a strand in a lamp's map: finer ones would fall between its texels
 MINIMUM_PX = 1.3
+COLUMNS = 2048  # texels of a row of points
 CHUNK = 8192  # strands that are put on the graphics card at a time
 
 
@@ -31,6 +34,45 @@ class Hair:
         self.normals = turned.astype(np.float32)
         light = on.baked.light[root]
         self.environment = np.maximum(np.einsum("nci,ni->nc", light, self.normals), 0)
+        self._lit: gl.TextureArray | None = None
+
+    def light(
+        self,
+        context: gl.Context,
+        programs: Callable[..., gl.Program],
+        lamps: Lamps,
+        surroundings: Surroundings,
+    ) -> None:
+        """Find what of each lamp's light reaches each point, by the lamps' maps: for all views."""
+        count = self.points.shape[0] * self.points.shape[1]
+        rows = -(-count // COLUMNS)
+        normals = np.repeat(self.normals, self.points.shape[1], axis=0)
+        size = (COLUMNS, rows)
+
+        def texels(xyz: np.ndarray, w: np.ndarray | float) -> gl.Texture:
+            data = np.zeros((rows * COLUMNS, 4), np.float32)
+            data[:count, :3], data[:count, 3] = xyz, w
+            return gl.Texture(*size, GL.GL_RGBA32F, data=data.reshape(rows, COLUMNS, 4))
+
+        places = texels(self.points.reshape(-1, 3), self.strands.cover.ravel())
+        values = {
+            **lamps.uniforms(),
+            **surroundings.uniforms(),
+            "places": places,
+            "normals": texels(normals, 0.0),
+            "extinction": EXTINCTION,
+        }
+        program = programs("passes/hair_lit.frag", {**lamps.defines(), **surroundings.defines()})
+        lit = np.zeros((max(1, len(lamps.lights)), rows, COLUMNS, 1), np.float32)
+        with gl.Target(*size, [GL.GL_R32F]) as target:
+            for k in range(len(lamps.lights)):
+                target.bind()
+                program.use(**program.accepts({**values, "lamp": k}))
+                gl.draw_fullscreen(context)
+                lit[k] = target.textures[0].read()[::-1]
+        for texture in (places, values["normals"]):
+            texture.delete()
+        self._lit = gl.TextureArray(*size, len(lit), GL.GL_R32F, data=lit)
 
     def draw_shadows(self, light: Light) -> None:
         """Flat ribbons that face a lamp, with the program in use."""
@@ -54,10 +96,23 @@ class Hair:
         surroundings: Surroundings,
         shared: dict,
         pixels_per_mm: float,
+        size: tuple[int, int],
+        depths: list[np.ndarray],
     ) -> None:
-        """Blend all strands into the bound target; shared: camera_position, view, projection."""
-        distance = np.linalg.norm(self.points.mean(axis=1) - shared["camera_position"], axis=1)
-        order = np.argsort(-distance, kind="stable")  # far strands first: blended back to front
+        """Blend all strands that can be seen into the bound target.
+
+        shared: camera_position, view, projection; size: of the target in pixels; depths: what
+        `occlusion.blocks` makes of the view depths of surfaces.
+        """
+        half_mm = 0.5 * self.size * self.strands.width_mm
+        matrix = shared["projection"] @ shared["view"]
+        bounds = (self.points, matrix, size, half_mm, 0.5 * MINIMUM_PX)
+        seen = np.flatnonzero(~occlusion.hidden(depths, *bounds))
+        distance = np.linalg.norm(
+            self.points[seen].mean(axis=1) - shared["camera_position"], axis=1
+        )
+        # far strands first: blended back to front
+        order = seen[np.argsort(-distance, kind="stable")]
         defines = {**lamps.defines(), **surroundings.defines()}
         program = programs("passes/hair.frag", defines, vertex="passes/hair.vert")
         values = {
@@ -67,6 +122,7 @@ class Hair:
             "pixels_per_mm": pixels_per_mm,
             "minimum_px": MINIMUM_PX,
             "extinction": EXTINCTION,
+            "lit_map": self._lit,
         }
         program.use(**program.accepts(values))
         for start in range(0, len(order), CHUNK):
@@ -96,7 +152,7 @@ class Hair:
             2: strand,
             3: per_strand(strands.colour),
             4: per_strand(self.environment),
-            5: per_strand(self.normals),
+            5: twice(chosen[:, None] * p + np.arange(p)),
         }
         return gl.Mesh(attributes, ribbon_faces(n, p))
 
