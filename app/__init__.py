@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flask import Flask
-
 if TYPE_CHECKING:
+    from flask import Flask
+
     from app.researchers import Doorkeeper
     from app.study import Study
 
@@ -42,6 +42,8 @@ def create_app(
     doorkeeper: of the accounts of the server; by default those in the study's own database.
     root: what the study's addresses begin with where it is not alone (`app.hosting`).
     """
+    from flask import Flask
+
     from app import dashboard, language, monitoring, questionnaire, researchers, security, web
     from app.database import Database
     from app.hosting import Hosted

@@ -10,7 +10,7 @@ between the two halves of the walks (`halves`), so that errors can be stated wit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -22,11 +22,12 @@ from renderer.optics.curve import Curve
 from renderer.optics.medium import Stack
 from renderer.parameters import parameter
 from renderer.passes.surfaces import Drawn
-from renderer.reference import traced
-from renderer.reference.estimate import Halves, Walked, estimate, walked
-from renderer.reference.walk import Part, Solid
 from renderer.techniques.base import Inputs, Room, Scattered, Technique
 from renderer.techniques.drawing import result
+
+if TYPE_CHECKING:
+    from renderer.reference.estimate import Halves, Walked
+    from renderer.reference.walk import Part, Solid
 
 NEAR_MM = 0.5  # a ray towards a pixel's point starts so far before it
 
@@ -82,6 +83,8 @@ class Reference(Technique):
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         """That of the medium that is walked in for a preset's curve; for others the curve's own."""
+        from renderer.reference.estimate import walked
+
         if curve.name not in media.names():
             return curve.edge(x_mm)
         made = walked(curve.name, self.index)
@@ -107,6 +110,9 @@ class Reference(Technique):
 
     def halves(self, inputs: Inputs, where: np.ndarray) -> Halves:
         """Scattered irradiance at the pixels `where` (H, W), row 0 at the top, in their order."""
+        from renderer.reference.estimate import Halves, estimate
+        from renderer.reference.walk import Solid
+
         room = inputs.needed_room(self.name)
         solid = Solid([part_of(drawn) for drawn in room.surfaces])
         medium = medium_of(room, self.index)
@@ -139,6 +145,8 @@ class Reference(Technique):
 
     def _traced(self, inputs: Inputs, where: np.ndarray, solid: Solid, medium: Walked) -> Halves:
         """By light that is traced from where it comes from."""
+        from renderer.reference import traced
+
         if inputs.executor is not None:
             raise InputError(
                 "reference.light is 'traced' with workers; expected 'given', or no workers: light "
@@ -194,6 +202,8 @@ class Reference(Technique):
 
 def medium_of(room: Room, index: float = 0.0) -> Walked:
     """The medium that is walked in for a room's; index: see `walked`."""
+    from renderer.reference.estimate import walked
+
     return walked(room.surfaces[0].item.primitive.material.value.layered(), index)
 
 
@@ -221,6 +231,9 @@ def visible(
 
 
 def part_of(drawn: Drawn) -> Part:
+    """A surface's triangles in the world, as walks take them."""
+    from renderer.reference.walk import Part
+
     part = drawn.item.primitive
     return Part(drawn.item.in_world(part.positions), part.faces)
 
