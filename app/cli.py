@@ -21,6 +21,7 @@ VERBS = {
     "log": "app.commands.log",
     "links": "app.commands.links",
     "simulate": "app.commands.simulate",
+    "store": "app.commands.store",
     "archive": "app.commands.archive",
     "restore": "app.commands.restore",
     "analyse": "app.commands.analyse",
