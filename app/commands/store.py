@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 
-@click.group()
+@click.group(no_args_is_help=False)
 def command() -> None:
     """Send a study's images to an object store, or fetch them from there.
 
