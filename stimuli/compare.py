@@ -176,13 +176,17 @@ def framed(
 
 
 def _at(table: dict, framing: str) -> dict:
-    """A scene's table with the camera at FRAMING or FRAMING/ANGLE."""
+    """A scene's table with the camera at FRAMING or FRAMING/ANGLE, a name or degrees of yaw."""
     name, _, angle = framing.partition("/")
     level = {"framing": name} if name else {}
     if not angle:
         return merge(table, {"camera": level})
-    own = {k: v for k, v in table.get("camera", {}).items() if k != "yaw_deg"}
-    return {**table, "camera": {**own, **level, "angle": angle}}
+    try:
+        level["yaw_deg"] = float(angle)
+    except ValueError:
+        level["angle"] = angle
+    own = {k: v for k, v in table.get("camera", {}).items() if k not in ("yaw_deg", "angle")}
+    return {**table, "camera": {**own, **level}}
 
 
 def _shot(

@@ -426,3 +426,82 @@ def cost(scene, out, techniques, framing, axes, walks, patches, **options) -> No
         files += costs.draw_quality(best, costs.timed_by(best), out / "quality")
     for file in files:
         click.echo(f"{file}")
+
+
+@command.command("motion")
+@click.argument("scene", default="thesis")
+@click.option(
+    "--out",
+    "-o",
+    required=True,
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for motion.csv, .svg and .png.",
+)
+@click.option(
+    "--techniques",
+    "-t",
+    multiple=True,
+    default=["golubev", "golubev_plus", "subdermal"],
+    show_default=True,
+    metavar="NAME[:KEY=VALUE...]",
+    help="A technique with its parameters; repeat for more.",
+)
+@click.option("--framing", "-f", default="close-up", show_default=True, help="Of the scene.")
+@click.option(
+    "--converged",
+    default="golubev:samples=256",
+    show_default=True,
+    metavar="NAME[:KEY=VALUE...]",
+    help="What each frame is compared to.",
+)
+@drawing.size("640x360", "the frames")
+@drawing.supersample(2, "Computed pixels in a pixel")
+@click.option(
+    "--frames",
+    type=click.IntRange(2, 3600),
+    default=60,
+    show_default=True,
+    help="Of the turntable.",
+)
+@click.option(
+    "--degrees",
+    type=click.FloatRange(-180, 180),
+    default=1.0,
+    show_default=True,
+    help="Between two frames.",
+)
+@click.option("--first", type=float, default=0.0, show_default=True, help="Yaw of the first frame.")
+@drawing.patches("A value over the scene's, by its dotted key: lights.rim=false; repeat for more.")
+@drawing.seed("hair, skin noise and baked light")
+def motion(scene, out, techniques, framing, converged, patches, **options) -> None:
+    """Measure whether techniques flicker or pop while the camera goes round SCENE.
+
+    The error to the converged picture of each frame, its change from frame to frame (flicker), and
+    that of its means over 4x4 pixels, where noise cancels and a tile that takes other taps shows.
+    """
+    from tqdm import tqdm
+
+    from stimuli.experiment import motion as motions
+    from stimuli.experiment.chapter import write_csv
+
+    if converged == "all":
+        raise click.BadParameter("got all; expected one technique", param_hint="--converged")
+    (goal,) = motions.chosen([converged]).values()
+    made, options = motions.chosen(techniques), motions.Options(**options)
+    out.mkdir(parents=True, exist_ok=True)
+    rows: list[dict] = []
+    turned = motions.turn(scene, patches, framing, made, goal, options)
+    for row in tqdm(turned, total=options.frames * len(made), unit="picture", disable=None):
+        rows.append(row)
+        write_csv(rows, out / "motion.csv")  # a run that is ended keeps what it has measured
+    click.echo(f"{options.frames} frames, {options.degrees:g} degrees apart, to {converged}")
+    click.echo(
+        f"{'technique':<34}{'samples':>9}{'rmse':>8}{'flicker':>9}{'pop':>8}{'largest pop':>13}"
+    )
+    for row in motions.summary(rows):
+        click.echo(
+            f"{row['technique']:<34}{row['samples']:>9.2f}{row['rmse']:>8.3f}{row['flicker']:>9.3f}"
+            f"{row['pop']:>8.3f}{row['largest']:>13.2f}"
+        )
+    for file in motions.draw(rows, out / "motion"):
+        click.echo(f"{file}")

@@ -71,8 +71,8 @@ def _plain(axis) -> None:
     """Logarithmic axes with few plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    for one in (axis.xaxis, axis.yaxis):
-        one.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    for one, subs in ((axis.xaxis, (1.0, 2.0, 5.0)), (axis.yaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))):
+        one.set_major_locator(LogLocator(subs=subs))
         one.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         one.set_minor_formatter(NullFormatter())
 
@@ -158,7 +158,7 @@ def _ladder(folder, out, framing, tasks, rows, options) -> Iterator[Path]:
                     "flip_image": flips[1],
                 }
             )
-        axes[line, 0].set_ylabel(f"against\n{name}", fontsize=7)
+        axes[line, 0].set_ylabel("against\n" + name.replace(":", "\n"), fontsize=7)
     figure.colorbar(last, ax=axes, label="DSSIM, all values shown", shrink=0.8)
     figure.suptitle(f"Golubev with few samples, {framing} ({_said(options)})", fontsize=9)
     yield from _saved(figure, out / f"4.4-{framing}", table)
