@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from app.hosting import Hosted
 
 T = TypeVar("T")
+#: What the pages' scripts accept, and nothing else; compared before anything is parsed.
+JSON = "application/json"
 
 #: A year: an image's address is the hash of its bytes, so what it names never changes.
 IMMUTABLE = "public, max-age=31536000, immutable"
@@ -76,8 +78,8 @@ def download(body: str | Iterable[str] | Iterable[bytes], name: str) -> Response
 
 def wants_json() -> bool:
     """Whether the page's script asks, and not a form or an address bar."""
-    return (
-        request.accept_mimetypes.best_match(["text/html", "application/json"]) == "application/json"
+    return request.headers.get("Accept") == JSON or (
+        request.accept_mimetypes.best_match(["text/html", JSON]) == JSON
     )
 
 
