@@ -15,8 +15,8 @@ from PIL import Image
 from playwright.sync_api import expect, sync_playwright
 from sqlalchemy import select
 
-from app import accounts, create_app
-from app.models import Response, Trial
+from app import accounts, create_app, notes
+from app.models import Participant, Response, Trial
 from app.server import running
 from stimuli.study import THESIS
 
@@ -612,6 +612,34 @@ def test_the_dashboard_folds_on_a_phone_and_axe_finds_nothing(
     page.evaluate("for (const one of document.querySelectorAll('details')) one.open = true")
     violations = Axe().run(page, options=RULES).response["violations"]
     assert [(one["id"], one["nodes"][0]["html"]) for one in violations] == []
+
+
+def test_the_pages_of_researchers_fit_a_phone_and_axe_finds_nothing(page, address, app, person):
+    from axe_playwright_python.sync_playwright import Axe
+
+    def look():
+        assert page.evaluate("document.documentElement.scrollWidth") == 390, page.url
+        violations = Axe().run(page, options=RULES).response["violations"]
+        assert [(one["id"], one["nodes"][0]["html"]) for one in violations] == [], page.url
+
+    person().begin()
+    with app.extensions["database"].write() as db:
+        accounts.add(db, "ada.lovelace@example.org", "viewer", "x" * 12, who="the test")
+        notes.add(db, db.get(Participant, 1), "wore " + "sunglasses" * 20, who="owner")
+        secret = "another password"
+        accounts.add(db, "owner", "owner", secret, who="the test")
+    page.set_viewport_size({"width": 390, "height": 720})
+    page.goto(f"{address}dashboard/login")
+    look()
+    page.fill("[name=name]", "owner")
+    page.fill("[name=password]", secret)
+    page.click("button:has-text('Sign in')")
+    for path in ("log", "notes", "studies", "participants/P0001"):
+        page.goto(f"{address}dashboard/{path}")
+        look()
+    page.fill("[name=note]", "<b>two</b>\nlines")
+    page.click("button:has-text('Add')")
+    expect(page.locator(".note .text").first).to_have_text("<b>two</b>\nlines")
 
 
 def test_the_simulated_study_is_marked(page, study_dir):
