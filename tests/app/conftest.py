@@ -16,7 +16,7 @@ from argon2 import PasswordHasher
 from PIL import Image
 from sqlalchemy import create_engine, make_url, select, text
 
-from app import accounts, create_app
+from app import accounts, create_app, database
 from app.database import Database
 from app.models import Participant, Response
 from app.simulation.client import forms
@@ -55,12 +55,38 @@ def database_of_the_test(request, monkeypatch):
         Database, "__init__", lambda self, *a: (init(self, *a), opened.append(self))[0]
     )
     yield
-    for database in opened:
-        database.close()
+    for one in opened:
+        one.close()
     with engine.connect() as db:
         for name in made.values():
             db.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
     engine.dispose()
+
+
+#: What makes an empty SQLite database one of the newest schema, after the first test needed one.
+SCHEMA = []
+
+
+@pytest.fixture(autouse=True)
+def migrated_once(monkeypatch):
+    """The migrations run over one empty SQLite database in each process of the tests; others get
+    what came out. Whatever is not empty is migrated as it is by users.
+    """
+    migrate = database.migrate
+
+    def copied(connection):
+        sqlite = connection.dialect.name == "sqlite"
+        raw = connection.connection.dbapi_connection
+        if not sqlite or raw.execute("SELECT 1 FROM sqlite_master").fetchone():
+            migrate(connection)
+        elif SCHEMA:
+            raw.executescript(SCHEMA[0])
+        else:
+            migrate(connection)
+            SCHEMA.append("\n".join(raw.iterdump()))
+
+    monkeypatch.setattr("app.database.migrate", copied)
+    monkeypatch.setattr("app.archive.migrate", copied)
 
 
 @pytest.fixture
