@@ -30,9 +30,6 @@ from stimuli.parts import PEOPLE
 from stimuli.scenes import MAP_ENDING
 from stimuli.study import FRAMING, Cell, Render
 
-#: Of zlib: half the time of 6, its own choice, for files 6 % larger.
-PNG_LEVEL = 4
-
 
 @dataclass(frozen=True)
 class Stimulus:
@@ -295,6 +292,8 @@ def samples_per_pixel(samples: np.ndarray) -> float:
 def write_png(path: Path, pixels: np.ndarray, size: tuple[int, int]) -> str:
     """Write (height, width, 3) bytes as a PNG and return the sha256 of the file."""
     import PIL.Image
+
+    from renderer import PNG_LEVEL
 
     if pixels.shape != (size[1], size[0], 3) or pixels.dtype != np.uint8:
         raise RuntimeError(

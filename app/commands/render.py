@@ -116,7 +116,6 @@ def command(
 
     import renderer
     from renderer.errors import InputError
-    from stimuli.drawing import PNG_LEVEL
     from stimuli.scenes import load_table, merge, read_scene, stage
     from stimuli.study import with_head
 
@@ -154,7 +153,7 @@ def command(
         drawing.frame() as frame,
     ):
         result = frame.render(chosen)
-    Image.fromarray(result.image).save(out, compress_level=PNG_LEVEL)
+    Image.fromarray(result.image).save(out, compress_level=renderer.PNG_LEVEL)
     if samples:
         np.save(samples, result.samples)
     if contrast:
