@@ -62,7 +62,7 @@ class Database:
         except (NoSuchModuleError, ModuleNotFoundError) as error:
             raise InputError(
                 f"{shown}: there is no driver for such a database here ({error}); "
-                "PostgreSQL needs pip install 'subdermal[postgres]'"
+                "PostgreSQL needs pip install --no-deps -r requirements-postgres.lock"
             ) from None
         except DBAPIError as error:
             raise InputError(

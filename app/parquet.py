@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 #: Rows of a group: some 10 MB as they are read, 200 kB as they are written.
 GROUP_ROWS = 5000
-MISSING = "Parquet is written by pyarrow, which is not installed: pip install subdermal[parquet]"
+MISSING = (
+    "Parquet is written by pyarrow, which is not installed: "
+    "pip install --no-deps -r requirements-parquet.lock"
+)
 
 
 def available() -> bool:

@@ -85,7 +85,7 @@ def _dask(address: str, expected: int) -> Iterator[Crew]:
     except ImportError as error:
         raise InputError(
             f"--cluster needs Dask's distributed, which is not here ({error}); install the extra: "
-            "pip install 'subdermal[cluster]', or requirements-cluster.lock"
+            "pip install --no-deps -r requirements-cluster.lock"
         ) from error
     try:
         client = Client(address, timeout=ANSWER_S, set_as_default=False)

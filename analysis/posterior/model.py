@@ -13,7 +13,7 @@ w, v, u and s have normal priors with spreads that are half-normal, as the thres
 the side's is normal. Their scales are `analysis.options.Sampling`'s.
 
 The posterior is drawn by the No-U-Turn sampler of NumPyro (Phan, Pradhan and Jankowiak 2019,
-arXiv:1912.11554), an extra: `pip install subdermal[bayes]`. R-hat and effective sizes are its split
+arXiv:1912.11554), an extra: requirements-bayes.lock. R-hat and effective sizes are its split
 R-hat and Geyer's estimate.
 """
 
@@ -181,7 +181,7 @@ def sample(
     if util.find_spec("numpyro") is None:
         raise InputError(
             "the Bayesian model needs the sampler NumPyro, which is not installed; expected "
-            "`pip install subdermal[bayes]`, or the packages of requirements-bayes.lock"
+            "`pip install --no-deps -r requirements-bayes.lock`"
         )
     import jax
     import numpyro

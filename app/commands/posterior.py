@@ -64,7 +64,7 @@ def command(
     """Draw the posterior of a multilevel model of RESPONSES, a responses.csv.
 
     People and images are both samples, so that it also says what would hold for another image of
-    the same sort. Needs the extra `subdermal[bayes]`. Ctrl+C ends it at once; nothing is written
+    the same sort. Needs requirements-bayes.lock. Ctrl+C ends it at once; nothing is written
     before the last draw, and sampling that was interrupted begins anew.
     """
     from analysis import declared as declarations

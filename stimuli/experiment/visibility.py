@@ -58,7 +58,8 @@ class ColorVideoVDP:
         except ImportError as error:
             raise InputError(
                 f"ColorVideoVDP cannot be loaded ({error}); expected the extra visibility: "
-                "`make test-visibility` installs it, or pip install 'subdermal[visibility]'"
+                "`make test-visibility` installs it, or "
+                "pip install --no-deps -r requirements-visibility.lock"
             ) from error
         from importlib.metadata import version
 

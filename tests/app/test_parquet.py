@@ -25,7 +25,7 @@ def study_dir(tmp_path, write_study):
 def test_without_pyarrow_one_line_says_what_to_install(person, experimenter, monkeypatch):
     monkeypatch.setattr(parquet, "available", lambda: False)
     response = experimenter.get("/dashboard/responses.parquet")
-    assert response.status_code == 404 and "pip install subdermal[parquet]" in response.text
+    assert response.status_code == 404 and "requirements-parquet.lock" in response.text
     assert "needs the extra parquet" in experimenter.get("/dashboard/").text
     with zipfile.ZipFile(io.BytesIO(experimenter.get("/dashboard/export.zip").data)) as archive:
         assert "responses.parquet" not in archive.namelist()

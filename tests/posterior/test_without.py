@@ -17,7 +17,7 @@ def test_the_extra_is_named(run, tmp_path, monkeypatch):
     monkeypatch.setattr(util, "find_spec", lambda name: None if name == "numpyro" else find(name))
     (tmp_path / "responses.csv").write_text(ROWS)
     code, _, err = run("posterior", tmp_path / "responses.csv", "--out", tmp_path / "out")
-    assert code == 2 and "pip install subdermal[bayes]" in err and err.count("\n") == 1
+    assert code == 2 and "requirements-bayes.lock" in err and err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 

@@ -141,7 +141,7 @@ def test_without_the_extra_one_line_names_it(ready_made, monkeypatch, capsys):
     monkeypatch.setattr(builtins, "__import__", lacks)
     assert main(["experiment", "visibility", str(ready_made)]) == 2
     err = capsys.readouterr().err
-    assert "subdermal[visibility]" in err and err.count("\n") == 1
+    assert "requirements-visibility.lock" in err and err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
