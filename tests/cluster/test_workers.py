@@ -103,7 +103,12 @@ def test_workers_end_when_they_are_to(tmp_path, who):
     command = [sys.executable, tmp_path / "endless.py", tmp_path / "a", tmp_path / "b"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, start_new_session=True, env=environment
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=environment,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored behind `&`
     )
     deadline = time.monotonic() + 60
     while len(list(tmp_path.glob(".*.part"))) < 2 and time.monotonic() < deadline:

@@ -121,7 +121,7 @@ def test_a_sheets_faces_send_what_the_multipole_says(samples, profiles):
         own, thick = [t[0] for t in totals], 1.0
     for towards, wanted in ((1.0, own[0]), (-1.0, own[1])):
         table = behind_a_sheet(2.0)
-        table["objects"]["sheet"]["size_mm"] = [60.0, 60.0]
+        table["objects"]["sheet"]["size_mm"] = [44.0, 44.0]
         table["lights"]["lamp"]["direction"] = [0.0, 0.0, towards]
         table["camera"]["height_mm"] = 10.0
         with drawn(table, (24, 24)) as frame:
