@@ -73,6 +73,8 @@ def load_scan(scan: Scan) -> Head:
     terms |= {"licence": scan.licence or "not said"}
     terms |= {"credit": credit} if credit else {}
     model = scan_model(read, scan.edge_mm)
+    if model.eyes and "eye" not in read.part_kinds:
+        notes.append(f"{read.name}: its sockets are open and got eyes")
     before, after = len(read.positions_mm), len(model.surface.positions)
     if after > before:
         notes.append(f"{read.name}: it was subdivided smoothly, {before} points to {after}")

@@ -18,6 +18,9 @@ EYES_BELOW_CROWN_MM = 112.0  # half an adult head's height: of a head whose face
 MATCH_MM = (
     12.0  # how far apart surfaces count that face a radian apart, where masks are carried over
 )
+EYE_MM = 12.0  # radius of a ball, for an average head
+LID_MM = 1.0  # thickness of a lid
+OPEN_MM = 4.0  # so far behind the face about it a socket is open
 LEVELS = 3  # of subdivision, at most
 FINE_LIMIT = 250_000  # faces: no finer above
 
@@ -57,9 +60,10 @@ def _clustered(
     )
 
 
-def _landmarks(scan, p: np.ndarray, eye_points: np.ndarray | None) -> dict[str, np.ndarray]:
+def _landmarks(scan, p: np.ndarray, eye_points, balls) -> dict[str, np.ndarray]:
     """Where eyes, nose and mouth of an upright head that looks along +z are: given ones, those of
-    its eye parts and of the face that was found, else its proportions.
+    its eye parts (N, 3) or of the balls that it got, and of the face that was found, else its
+    proportions.
     """
     fit = scan.placing.fit
     if fit is None:
@@ -78,6 +82,9 @@ def _landmarks(scan, p: np.ndarray, eye_points: np.ndarray | None) -> dict[str, 
         apart = np.array([np.abs(eye_points[:, 0] - middle).mean(), 0, 0])
         eyes = np.array([middle, eye_points[:, 1].mean(), eye_points[:, 2].mean()])
         marks |= {"eyes": eyes, "eye_l": eyes + apart, "eye_r": eyes - apart}
+    elif balls:
+        both = [ball.centre for ball in balls]
+        marks |= {"eyes": 0.5 * (both[0] + both[1]), "eye_l": both[0], "eye_r": both[1]}
     marks |= scan.placing.landmarks
     if {"eye_l", "eye_r"} & set(scan.placing.landmarks):
         marks["eyes"] = 0.5 * (marks["eye_l"] + marks["eye_r"])
@@ -117,6 +124,60 @@ def _masks(scan, p: np.ndarray, normals: np.ndarray) -> np.ndarray:
     for name in ("hair", "beard", "inside"):  # a scan brings its own, or none
         masks[:, MASKS.index(name)] = 0
     return masks.astype(np.float32)
+
+
+def _sockets(p, faces, marks, scale: float) -> tuple[Eyeball, ...]:
+    """The balls that open sockets want, left of the person first; none where one of both is closed.
+
+    Looked at from the front, a socket is where nothing is met near the lids' depth. A ball lies in
+    the middle of the opening and behind its rim, so that the lids lie on it.
+    """
+    import trimesh
+    from scipy.ndimage import binary_dilation, label
+
+    mesh, balls, step = trimesh.Trimesh(p, faces, process=False), [], 0.5 * scale
+    radius = EYE_MM * scale
+    for name in ("eye_l", "eye_r"):
+        across, down = np.meshgrid(np.arange(-44, 45) * step, np.arange(-32, 33) * step)
+        starts = np.dstack([across, down, np.full_like(across, 150 * scale)]) + marks[name]
+        rays = starts.reshape(-1, 3), np.tile([0.0, 0.0, -1.0], (across.size, 1))
+        hit = mesh.ray.intersects_first(*rays)
+        normal, corner = mesh.face_normals[hit], mesh.triangles[hit, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            flat = ((corner - rays[0])[:, :2] * normal[:, :2]).sum(axis=1)
+            depth = corner[:, 2] + flat / normal[:, 2]
+        depth = np.where(hit >= 0, depth, -np.inf).reshape(across.shape)
+        open_ = depth < _smooth(depth) - OPEN_MM * scale
+        parts, _ = label(open_)
+        middle = parts[24:41, 30:59]  # the opening near where the eye should be
+        if not middle.any():
+            return ()
+        own = parts == np.bincount(middle[middle > 0]).argmax()
+        if not 40 * scale**2 < own.sum() * step**2 < 500 * scale**2:
+            return ()
+        rim = binary_dilation(own, iterations=2) & ~open_ & np.isfinite(depth)
+        x, y = across[own].mean(), down[own].mean()
+        beside = (across[rim] - x) ** 2 + (down[rim] - y) ** 2
+        near = beside < (0.95 * radius) ** 2
+        if near.sum() < 10:
+            return ()
+        lids = np.quantile(depth[rim][near] - np.sqrt(radius**2 - beside[near]), 0.25)
+        z = lids - LID_MM * scale
+        place = np.array([marks[name][0] + x, marks[name][1] + y, z])
+        balls.append(Eyeball(place, float(radius)))
+    return tuple(balls)
+
+
+def _smooth(depth: np.ndarray) -> np.ndarray:
+    """The paraboloid (H, W) that most of a map of depths lies on, what is deeper left out."""
+    y, x = np.indices(depth.shape) / np.array(depth.shape)[:, None, None] - 0.5
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
+    good = np.isfinite(depth)
+    for _ in range(5):
+        plane = terms @ np.linalg.lstsq(terms[good], depth[good])[0]
+        off = np.where(np.isfinite(depth), depth - plane, -np.inf)
+        good = off > np.quantile(off[np.isfinite(off)], 0.3)
+    return plane
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -177,7 +238,7 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     drawn without scattering; hair as surface.
 
     Left out: clear shells over the eyes, and cards of lashes and brows, which are nothing without
-    their alpha. Eyes without a texture are replaced by the default head's.
+    their alpha. Eyes without a texture are replaced by the default head's, which open sockets get.
     """
     kinds = [
         "card" if kind == "hair" and ("lash" in name.lower() or "brow" in name.lower()) else kind
@@ -191,6 +252,11 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     used, faces = np.unique(scan.faces[kept], return_inverse=True)
     faces = faces.reshape(-1, 3)
     positions, normals = scan.positions_mm[used].astype(float), scan.normals[used].astype(float)
+    fit, placing = scan.placing.fit, scan.placing
+    if eye_points is None and fit is not None:
+        shape = template.load().landmarks
+        near = {name: placing.place(fit.place(shape[name])) for name in ("eye_l", "eye_r")}
+        balls = _sockets(positions, faces, near, fit.scale * placing.mm_per_unit)
     scatters = np.ones(len(used))
     scatters[faces[kind[kept] != "skin"].ravel()] = 0
     colour = scan.base_colour or SKIN_COLOUR
@@ -231,6 +297,6 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
         surface,
         tuple(eyes.eyeball(ball) for ball in balls),
         None,
-        _landmarks(scan, positions, eye_points),
+        _landmarks(scan, positions, eye_points, balls),
         material=Material(albedo=tuple(float(v) for v in colour)),
     )

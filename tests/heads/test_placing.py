@@ -195,8 +195,10 @@ def coarse(heads, tmp_path):
     return file
 
 
-def test_a_scan_gets_masks_landmarks_and_a_smooth_surface(coarse):
+def test_a_scan_gets_masks_landmarks_eyes_and_a_smooth_surface(coarse, heads):
     from renderer.scene import MASKS
+
+    marks_of_woman = heads["woman"][2]
 
     head = load_scan(Scan(file=str(coarse), licence="CC0-1.0", credit="MakeHuman"))
     surface, marks = head.model.surface, head.model.landmarks
@@ -205,6 +207,13 @@ def test_a_scan_gets_masks_landmarks_and_a_smooth_surface(coarse):
     nose = surface.masks[np.linalg.norm(surface.positions - marks["nose"], axis=1).argmin()]
     chest = surface.masks[surface.positions[:, 1].argmin()]
     assert nose[MASKS.index("oil")] > chest[MASKS.index("oil")]
+    # the sockets of this head are open: balls lie within them, behind the lids
+    assert len(head.model.eyes) == 2 and any("got eyes" in note for note in head.notes)
+    for eye, side in zip(head.model.eyes, ("eye_l", "eye_r"), strict=True):
+        assert np.linalg.norm((eye.centre - marks_of_woman[side])[:2]) < 5
+        front = eye.centre[2] + eye.radius - marks_of_woman[side][2]
+        assert front == pytest.approx(14.5, abs=2.5)  # her own ball is as large
+    np.testing.assert_allclose(marks["eyes"], 0.5 * (marks["eye_l"] + marks["eye_r"]))
     # finer than the file, whose points all stay
     assert any("subdivided" in note for note in head.notes)
     from scipy.spatial import cKDTree
@@ -220,6 +229,16 @@ def test_a_scan_gets_masks_landmarks_and_a_smooth_surface(coarse):
             "credit": "MakeHuman",
         }
     ]
+
+
+def test_sockets_that_are_closed_get_no_eyes():
+    import trimesh
+
+    from stimuli.heads.scan_model import _sockets
+
+    ball = trimesh.creation.icosphere(4, 100.0)
+    marks = {"eye_l": np.array([30.0, 0, 85]), "eye_r": np.array([-30.0, 0, 85])}
+    assert _sockets(np.array(ball.vertices), np.array(ball.faces), marks, 1.0) == ()
 
 
 def test_a_ball_is_rounder_for_being_subdivided(tmp_path):
