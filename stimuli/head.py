@@ -83,7 +83,7 @@ def _draw(model: Model, name: str, lines: list[str], out: Path, step_mm: float =
     eyes = np.asarray(model.landmarks["eyes"])
     crown = points[np.abs(points - eyes).max(axis=1) < 260][:, 1].max()
     top, bottom = crown + 25, max(points[:, 1].min() - 10, eyes[1] - 220)
-    figure = Figure(figsize=(11, 7.4), dpi=120, facecolor="white")
+    figure = Figure(figsize=(11, 7.4), dpi=120, facecolor="white", layout="none")
     FigureCanvasAgg(figure)
     colours = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"]
     for place, (title, right, towards) in enumerate(VIEWS):
