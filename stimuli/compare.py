@@ -351,6 +351,13 @@ def colour_difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return deltaE_ciede2000(rgb2lab(_unit(one)), rgb2lab(_unit(other)))
 
 
+def coloured(values: np.ndarray, top: float) -> np.ndarray:
+    """A map (h, w) over the colour map, 0 to top and all above it: (h, w, 3) uint8."""
+    from matplotlib import colormaps
+
+    return (255 * colormaps[COLOUR_MAP](values / top)[..., :3]).astype(np.uint8)
+
+
 def sheet(shot: Shot, columns: int = 4, zoom: int = 1) -> Image.Image:
     """Every technique over its difference to the truth, all in one colour map; labelled.
 
@@ -381,7 +388,7 @@ def sheet(shot: Shot, columns: int = 4, zoom: int = 1) -> Image.Image:
                 words = f"{words[:-2]}…"
             place = (x + width / 2, y + BAND_PX * (0.28 + 0.46 * line))
             draw.text(place, words, font=font, fill=INK, anchor="mm")
-        shown = (shot.images[name], (255 * colours(maps[name] / top)[..., :3]).astype(np.uint8))
+        shown = (shot.images[name], coloured(maps[name], top))
         for row, picture in enumerate(shown):
             tile = Image.fromarray(picture).resize((width, height), Image.Resampling.NEAREST)
             page.paste(tile, (x, y + BAND_PX + row * (height + GAP_PX)))

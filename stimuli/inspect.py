@@ -16,9 +16,10 @@ import numpy as np
 from PIL import Image
 
 from analysis.manifest import open_manifest
-from stimuli.compare import COLOUR_MAP
+from stimuli.compare import coloured
 from stimuli.errors import InputError
 from stimuli.experiment.visibility import IDENTICAL
+from stimuli.heads.formats import decode_srgb
 from stimuli.manifest import MASKS, Manifest
 from stimuli.manifest import Image as ShownImage
 
@@ -115,7 +116,8 @@ def inspect(manifest: Manifest, out: Path, limits: Limits | None = None) -> Insp
     predicted = {}
     for one in open_manifest(manifest.directory).visibility.get("pairs", ()):
         predicted[one["cell"], frozenset((one["a"], one["b"]))] = IDENTICAL - one["jod"]
-    pictures, flags, found, maps = [], [], [], {}
+    pictures, flags, found, maps = [], [], [], []
+    (out / "maps").mkdir(parents=True, exist_ok=True)
     shown: dict[str, dict[str, ShownImage]] = {}
     for image in manifest.images:
         shown.setdefault(image.cell, {})[image.technique] = image
@@ -133,7 +135,9 @@ def inspect(manifest: Manifest, out: Path, limits: Limits | None = None) -> Insp
             outside = None
             if mask is not None and not mask.all():
                 outside = float(levels[~_grown(mask)].max(initial=0))
-            maps[cell, a, b] = apart
+            place = out / "maps" / f"{cell}_{a}_{b}.png"
+            np.save(place.with_suffix(".npy"), apart)  # coloured when the largest is known
+            maps.append(place)
             found.append(
                 Pair(
                     cell,
@@ -149,7 +153,10 @@ def inspect(manifest: Manifest, out: Path, limits: Limits | None = None) -> Insp
                 )
             )
     top = max(1.0, float(np.ceil(max((pair.most for pair in found), default=1.0))))
-    _write_maps(maps, out, top)
+    for place in maps:
+        values = place.with_suffix(".npy")
+        Image.fromarray(coloured(np.load(values), top)).save(place)
+        values.unlink()
     flags += [flag for pair in found for flag in _flags_of_pair(pair, limits, labels)]
     return Inspection(tuple(pictures), tuple(found), tuple(flags), top)
 
@@ -186,9 +193,7 @@ def _grown(mask: np.ndarray, pixels: int = 2) -> np.ndarray:
 
 
 def _picture(cell: str, name: str, pixels: np.ndarray, lab: np.ndarray, skin: np.ndarray):
-    values = pixels / 255
-    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-    luminance = float((linear @ [0.2126, 0.7152, 0.0722])[skin].mean())
+    luminance = float((decode_srgb(pixels / 255) @ [0.2126, 0.7152, 0.0722])[skin].mean())
     clipped = float((pixels == 255).any(axis=2)[skin].mean())
     return Picture(
         cell,
@@ -286,12 +291,3 @@ def _flags_of_pair(pair: Pair, limits: Limits, labels) -> list[Flag]:
             )
         )
     return flags
-
-
-def _write_maps(maps: dict, out: Path, top: float) -> None:
-    from matplotlib import colormaps
-
-    (out / "maps").mkdir(parents=True, exist_ok=True)
-    for (cell, a, b), apart in maps.items():
-        coloured = (255 * colormaps[COLOUR_MAP](np.clip(apart / top, 0, 1))[..., :3]).astype("u1")
-        Image.fromarray(coloured).save(out / "maps" / f"{cell}_{a}_{b}.png")

@@ -160,14 +160,15 @@ def similarity(source, target, weight):
 def _closest(mesh, points, normals, place, rounds, stretched=False):
     """Iterated closest points: (scale, rotation, offset, stretch) and the cost in mm."""
     scale, rotation, offset, stretch = place
-    for _ in range(rounds + 1):
+    for step in range(rounds + 1):
         at = scale * (points * stretch) @ rotation.T + offset
         distance, index = mesh.nearest(at)
         facing = ((normals @ rotation.T) * mesh.normals[index]).sum(axis=1)
         cost = _cost(distance, facing, scale)
-        good = (cost <= np.quantile(cost, _KEPT)) & (facing > 0.2)
-        total = np.minimum(cost, 60.0)[cost <= np.quantile(cost, _KEPT)].mean()
-        if good.sum() < 20 or _ == rounds:
+        pairs = cost <= np.quantile(cost, _KEPT)
+        good = pairs & (facing > 0.2)
+        total = np.minimum(cost, 60.0)[pairs].mean()
+        if good.sum() < 20 or step == rounds:
             break
         weight = 1 / (1 + (distance[good] / scale / 4.0) ** 2)
         target = mesh.points[index[good]]

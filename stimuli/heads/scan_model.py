@@ -10,6 +10,7 @@ from scipy import sparse
 from renderer.scene import MASKS, Material, Model, Proxy, Surface
 from stimuli.heads import eyes, template
 from stimuli.heads.anatomy import Eyeball
+from stimuli.heads.formats import decode_srgb
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
 CLUSTER_MM = 3.0
@@ -262,9 +263,7 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     colour = scan.base_colour or SKIN_COLOUR
     if scan.albedo is not None:
         mean = scan.albedo.reshape(-1, 3)[:: max(1, scan.albedo.size // 300_000)] / 255
-        colour = tuple(
-            np.where(mean <= 0.04045, mean / 12.92, ((mean + 0.055) / 1.055) ** 2.4).mean(axis=0)
-        )
+        colour = tuple(decode_srgb(mean).mean(axis=0))
     albedo = np.tile(np.array(colour), (len(used), 1))
     if len(used) > PROXY_LIMIT:
         proxy = _clustered(positions, normals, faces, albedo)
