@@ -116,7 +116,7 @@ def command(
 
     import renderer
     from renderer.errors import InputError
-    from stimuli.scenes import load_table, merge, read_scene, stage
+    from stimuli.scenes import framings, load_table, merge, read_scene, stage
     from stimuli.study import with_head
 
     chosen = renderer.make(technique, parameters)
@@ -124,9 +124,8 @@ def command(
         raise click.UsageError(f"{technique} is drawn by this process; expected no workers")
     table = merge(load_table(scene), patches)
     if framing:
-        if framing not in renderer.FRAMINGS:
-            known = ", ".join(renderer.FRAMINGS)
-            raise InputError(f"no framing {framing!r}; expected one of {known}")
+        if framing not in (known := framings(table)):
+            raise InputError(f"no framing {framing!r}; expected one of {', '.join(known)}")
         table = merge(table, {"camera": {"framing": framing}})
     definition = read_scene(with_head(table, head, said))
     _writable(out, (".png",))

@@ -2,7 +2,8 @@
 
 A scene file is TOML (thesis.toml is the one to copy). `rig` names a file of lights and an
 environment (stimuli/lights), `person` one of people (stimuli/people); what the scene itself says
-goes over what they say. A level of a study is a patch of the scene's table: `merge`.
+goes over what they say. `[framings.NAME]` are cameras of the scene's own. A level of a study is a
+patch of the scene's table: `merge`.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
     if rig is not None:
         path = part(rig, LIGHTS, f"{where}.rig")
         table = merge(_absolute(read_toml(path), path.parent), table)
+    table = _framed(table, where)
     objects = table.get("objects", {})
     if not isinstance(objects, Mapping):
         raise InputError(f"{where}.objects is {objects!r:.60}; expected a table of named tables")
@@ -91,6 +93,29 @@ def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
         objects[name] = {**entry, "material": name}
         materials[name] = merge(own, materials.get(name, {}))
     return {**table, "objects": objects, "materials": materials}
+
+
+def framings(table: Mapping[str, Any]) -> list[str]:
+    """Names that a scene's camera may go by: the scene's own, then the thesis's."""
+    from renderer.scene import FRAMINGS
+
+    own = table.get("framings", {})
+    return list(dict.fromkeys([*(own if isinstance(own, Mapping) else ()), *FRAMINGS]))
+
+
+def _framed(table: dict[str, Any], where: str) -> dict[str, Any]:
+    """The table without its own framings; the one that its camera names is put into the camera."""
+    own, camera = table.pop("framings", {}), table.get("camera", {})
+    if not isinstance(own, Mapping):
+        raise InputError(f"{where}.framings is {own!r:.60}; expected a table of named cameras")
+    if not isinstance(camera, Mapping) or camera.get("framing") not in own:
+        return table
+    chosen = own[camera["framing"]]
+    if not isinstance(chosen, Mapping):
+        name = camera["framing"]
+        raise InputError(f"{where}.framings.{name} is {chosen!r:.60}; expected a camera's table")
+    chosen = {k: v for k, v in chosen.items() if not (k == "yaw_deg" and "angle" in camera)}
+    return {**table, "camera": merge(chosen, camera)}
 
 
 def read_scene(table: Mapping[str, Any], where: str = "scene") -> Scene:

@@ -56,6 +56,26 @@ def test_cameras_by_name_and_by_number():
     assert np.linalg.norm(eye) == pytest.approx(camera.distance_mm)
 
 
+def test_a_scene_has_framings_of_its_own():
+    portrait = scenes.load_table("portrait")
+    own = portrait["framings"]
+    assert scenes.framings(portrait) == [*own, *(f for f in FRAMINGS if f not in own)]
+    assert scenes.framings(THESIS) == list(FRAMINGS)
+    for name, camera in own.items():
+        made = scenes.read_scene(scenes.merge(portrait, {"camera": {"framing": name}})).camera
+        assert made.framing == name and made.height_mm == camera["height_mm"]
+    turned = {"camera": {"framing": "ear", "angle": "front", "fov_y_deg": 30.0}}
+    camera = scenes.read_scene(scenes.merge(portrait, turned)).camera
+    assert (camera.yaw_deg, camera.fov_y_deg, camera.height_mm) == (0.0, 30.0, 120.0)
+
+
+@pytest.mark.parametrize("wrong", [3, {"near": 3}, {"near": {"yaw": 1.0, "height_mm": 1.0}}])
+def test_framings_that_are_none_are_refused(wrong):
+    table = {**THESIS, "framings": wrong, "camera": {"framing": "near"}}
+    with pytest.raises((InputError, SceneError), match="framings|camera"):
+        scenes.read_scene(table)
+
+
 def test_coatings_and_thickness_make_layers():
     coated = Material(
         medium="upper_dermis", coatings=({"medium": "epidermis", "thickness_mm": 0.2},)
