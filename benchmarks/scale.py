@@ -41,7 +41,7 @@ def study(techniques: int, heads: int, framings: int):
     if heads > 1:
         lines.append('[[factors]]\nname = "skin"\nlabel = "Skin"')
     for k in range(heads if heads > 1 else 0):
-        melanin = 0.1 + 2 * k / heads
+        melanin = 0.02 + 0.3 * k / heads
         lines.append(f'[[factors.levels]]\nname = "s{k}"\nlabel = "S{k}"')
         lines.append(f"set = {{ materials = {{ head = {{ melanin = {melanin:.4f} }} }} }}")
     for k in range(techniques):

@@ -15,6 +15,7 @@ def caches() -> dict[str, tuple[Path, str]]:
         "heads": (folder(), "base data of generated people, fetched again when needed"),
         "people": (folder() / "people", "generated people as arrays; made again"),
         "light": (folder() / "light", "light baked on scenes; baked again"),
+        "skin": (folder() / "skin", "colours of skin by its pigments; reckoned again"),
         "montecarlo": (
             cache_folder(),
             "simulated light in media; simulated again",
@@ -47,7 +48,7 @@ def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
 @click.option(
     "--clear",
     metavar="NAME",
-    type=click.Choice(["heads", "people", "light", "montecarlo", "reference", "converged"]),
+    type=click.Choice(["heads", "people", "light", "skin", "montecarlo", "reference", "converged"]),
     help="Remove this cache by its name. Nothing in it is lost for good.",
 )
 def command(clear: str | None) -> None:

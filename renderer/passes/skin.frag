@@ -17,10 +17,14 @@ uniform float layer_relief; uniform float layer_freckles; uniform float layer_mo
 uniform vec3 albedo_colour;
 uniform float roughness; uniform float f0; uniform float specular_strength;
 uniform vec2 lobe_roughness; uniform float lobe_share;
-uniform float melanin; uniform float blood; uniform float flush; uniform float mottling;
-uniform vec3 melanin_absorbance; uniform vec3 blood_absorbance; uniform vec3 dermis; uniform vec3 lip;
-uniform float freckles; uniform float freckle_share; uniform float moles; uniform float mole_share;
-uniform float beard_tint; uniform float scalp_tint;
+uniform sampler2D skin_table;        // log albedo: columns blood, rows melanin, one block of rows a thickness (renderer/optics/skin.py)
+uniform vec2 skin_most; uniform float skin_thinnest; uniform float skin_blocks;
+uniform float melanin; uniform float blood; uniform float flush; uniform float mottling; uniform vec2 uneven;
+uniform float eyelid_blood; uniform float eyelid_epidermis; uniform vec2 lip_blood; uniform float lip_melanin; uniform float lip_epidermis;
+uniform float freckles; uniform float freckle_share; uniform float moles; uniform float mole_share; uniform float vessels;
+uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 inside_colour;
+uniform float pore_darkness; uniform vec2 micro_mm;
+uniform float f0_oily; uniform float roughness_lips; uniform float lobe_share_oily; uniform float oil_patches;
 uniform float pore_depth; uniform float furrow_depth; uniform float bump_height; uniform float wrinkle_depth; uniform float lip_folds;
 uniform float roughness_dry; uniform float roughness_oily;
 // Where wrinkles lie, mm (renderer/scene/material.py): vec4 and vec2 say where they set in, are whole, begin to end, have ended.
@@ -34,39 +38,85 @@ uniform vec3 noise_origin;           // mm: the seed's place in the solid noise
 
 float fade(float size_mm, float pixel_mm) { float r = pixel_mm / size_mm; return 1.0 / (1.0 + 6.0 * r * r); }
 
-// Height in mm (x) and its gradient (yzw) of pores, furrows, bumps and wrinkles at p.
-vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
-    float lips = a.x, eyelid = a.w, pores = b.x, inside = b.w;
+// What of the relief a pixel still shows, and what the rest adds to the mirror's roughness: slopes of a mean square are lost.
+struct Relief { vec4 h; vec3 fine; float pore; float lost; };
+void lose(inout Relief r, float mean_square, float shown) { r.lost += mean_square * (1.0 - shown * shown); }
+
+// The nearest feature point, of those within half a cell: what small spots need, at a third of the price of `cells`.
+struct Spot { float f1; vec3 d1; uint id; };
+Spot spot(vec3 p) {
+    ivec3 base = ivec3(floor(p - 0.5));
+    Spot s; s.f1 = 9.0; s.d1 = vec3(0.0); s.id = 0u;
+    for (int k = 0; k < 8; ++k) {
+        ivec3 c = base + ivec3(k & 1, (k >> 1) & 1, k >> 2);
+        uint h = hash3(c);
+        vec3 d = p - (vec3(c) + 0.1 + 0.8 * unit3(h));
+        float q = dot(d, d);
+        if (q < s.f1) { s.f1 = q; s.d1 = d; s.id = h; }
+    }
+    s.f1 = sqrt(s.f1);
+    return s;
+}
+
+float lip_of(float mask) { return smoothstep(0.0, 0.6, mask); }         // how much of lip there is, 0.5 in the mask being its border
+float seam_of(float mask) { return clamp(2.0 * mask - 1.0, 0.0, 1.0); }  // how near the seam
+
+// Furrows between cells of 0.62 mm that are squashed along an axis, so that most run across it. Real ones follow the skin's tension.
+void furrows(inout Relief r, vec3 q, mat3 net, float deep, float shown, float weight) {
+    Cells g = cells(net * q / 0.62 + 31.7);
+    float gap = g.f2 - g.f1, wide = 0.17;
+    float f = exp(-gap * gap / (wide * wide));
+    vec3 d = transpose(net) * (g.d2 / max(g.f2, 1e-3) - g.d1 / max(g.f1, 1e-3));
+    r.h.x -= weight * deep * shown * f;
+    r.h.yzw += weight * deep * shown * f * 2.0 * gap / (wide * wide) * d / 0.62;
+}
+
+// Pores, furrows, bumps and wrinkles at p: height in mm and its gradient.
+Relief relief(vec3 p, float pixel_mm) {
+    float lips = lip_of(a.x), eyelid = a.w, pores = b.x, inside = b.w;
     vec3 q = p + noise_origin;
-    vec4 h = vec4(0.0);
-    pore_shade = 0.0;
+    Relief r; r.h = vec4(0.0); r.fine = vec3(0.0); r.pore = 0.0; r.lost = 0.0;
     float skin = (1.0 - lips) * (1.0 - inside);
 
-    // pores: two sizes of pits
+    // pores: two sizes of pits, of depths of their own, missing here and there
     for (int k = 0; k < 2; ++k) {
-        float size = k == 0 ? 0.95 : 0.60;
-        Cells c = cells(q / size);
-        float own = 0.35 + 0.65 * unit(mix_bits(c.id ^ 0x51u));
-        float depth = pore_depth * (k == 0 ? 0.042 : 0.022) * pores * own * skin * fade(size * 0.6, pixel_mm);
-        float w = k == 0 ? 0.30 : 0.28;
+        float size = k == 0 ? 1.02 : 0.64, w = k == 0 ? 0.24 : 0.22, shown = fade(size * 0.5, pixel_mm);
+        Spot c = spot(q / size);
+        float own = unit(mix_bits(c.id ^ 0x51u));
+        own = own * own * step(0.15, own);
+        float depth = pore_depth * (k == 0 ? 0.050 : 0.026) * pores * own * skin;
         float e = exp(-c.f1 * c.f1 / (w * w));
-        h.x -= depth * e;
-        h.yzw += depth * e * 2.0 / (w * w) * c.d1 / size;
-        pore_shade += (k == 0 ? 1.0 : 0.5) * e * own * pores * skin * fade(size * 0.6, pixel_mm);
-        // furrows between the cells of the larger net
-        if (k == 0) {
-            Cells g = cells(q / 0.72 + 31.7);
-            float gap = g.f2 - g.f1, wide = 0.16;
-            float f = exp(-gap * gap / (wide * wide));
-            float deep = furrow_depth * 0.015 * skin * (1.0 - 0.7 * pores) * fade(0.5, pixel_mm);
-            vec3 d = g.d2 / max(g.f2, 1e-3) - g.d1 / max(g.f1, 1e-3);
-            h.x -= deep * f;
-            h.yzw += deep * f * 2.0 * gap / (wide * wide) * d / 0.72;
-        }
+        r.h.x -= shown * depth * e;
+        r.h.yzw += shown * depth * e * 2.0 / (w * w) * c.d1 / size;
+        r.pore += (k == 0 ? 1.0 : 0.6) * mix(0.05, e, shown) * (0.25 + 0.75 * own) * pores * skin;
+        float steep = pore_depth * (k == 0 ? 0.050 : 0.026) * pores * skin / size;
+        lose(r, 0.17 * w * 4.0 * steep * steep, shown);
     }
+    // three fixed nets of furrows, by region: across on forehead and neck, down and outwards on cheeks, upright about the mouth
+    float deep = furrow_depth * 0.018 * skin * (1.0 - 0.6 * pores) * (1.0 - 0.5 * eyelid), shown = fade(0.5, pixel_mm);
+    lose(r, 30.0 * deep * deep, shown);
+    if (deep * shown > 1e-4) {
+        vec3 between = 0.5 * (eye_l + eye_r), off = p - between;
+        float side = abs(off.x), up = off.y;
+        float across = eye_l == eye_r ? 1.0 : max(smoothstep(8.0, 24.0, up), smoothstep(-104.0, -122.0, up));
+        float slanted = (1.0 - across) * smoothstep(10.0, 26.0, side), upright = 1.0 - across - slanted;
+        float s = off.x < 0.0 ? -0.5 : 0.5;  // sine of 30 degrees, outwards on either side
+        mat3 slant = mat3(1.35 * 0.866, 0.62 * -s, 0.0, 1.35 * s, 0.62 * 0.866, 0.0, 0.0, 0.0, 1.0);
+        if (across > 0.02) furrows(r, q, mat3(0.60, 0.0, 0.0, 0.0, 1.40, 0.0, 0.0, 0.0, 1.0), deep, shown, across);
+        if (slanted > 0.02) furrows(r, q, slant, deep, shown, slanted);
+        if (upright > 0.02) furrows(r, q, mat3(1.35, 0.0, 0.0, 0.0, 0.70, 0.0, 0.0, 0.0, 1.0), deep, shown, upright);
+    }
+    // finer relief that only the mirror sees
+    float rough = (1.0 - inside) * (1.0 - 0.5 * lips) * (0.7 + 0.3 * pores);
+    for (int k = 0; k < 2; ++k) {
+        float size = k == 0 ? 0.62 : 0.34, steep = rough * (k == 0 ? micro_mm.x : micro_mm.y) / size, seen = fade(size * 0.7, pixel_mm);
+        lose(r, 1.17 * steep * steep, seen);
+        if (seen > 0.08) r.fine += steep * seen * value_noise(q / size + 5.0 * float(k)).yzw;
+    }
+    vec4 h = r.h;
     // bumps of 1.6, 4 and 11 mm
     vec4 n1 = value_noise(q / 1.6), n2 = value_noise(q / 4.1 + 7.0), n3 = value_noise(q / 11.0 + 3.0);
-    float t1 = 0.022 * skin * fade(1.0, pixel_mm), t2 = 0.045 * skin, t3 = 0.16 * (1.0 - inside) * (1.0 - 0.6 * lips);
+    float t1 = 0.026 * skin * fade(1.0, pixel_mm), t2 = 0.045 * skin, t3 = 0.16 * (1.0 - inside) * (1.0 - 0.6 * lips);
     h += bump_height * (t1 * vec4(n1.x, n1.yzw / 1.6) + t2 * vec4(n2.x, n2.yzw / 4.1) + t3 * vec4(n3.x, n3.yzw / 11.0));
 
     // forehead: three faint lines that wander
@@ -108,50 +158,101 @@ vec4 relief(vec3 p, float pixel_mm, out float pore_shade) {
             h.z -= wrinkle_depth * 0.02 * bag * sin(s * wave) * wave * 0.5;
         }
     }
-    // lips: vertical folds that fan out
+    // lips: upright folds that fan out, some deep and most faint
     if (lips > 0.01) {
         vec2 d = vec2(p.x - mouth.x, (p.y - mouth.y) * 0.35);
-        float s = d.x * (1.0 + 0.10 * noise(q / 6.0)) + 0.9 * noise(q / vec3(2.4, 7.0, 2.4));
-        float wave = 2.0 * PI / 1.25;
-        float g = 0.5 + 0.5 * cos(s * wave), amp = lip_folds * 0.040 * lips * fade(1.0, pixel_mm) * (0.6 + 0.4 * noise(q / 3.0 + 9.0));
-        h.x -= amp * pow(g, 3.0);
-        h.y += amp * 3.0 * g * g * 0.5 * sin(s * wave) * wave;
-        Cells c = cells(q / 0.8 + 11.0);
-        h.yzw += lip_folds * 0.006 * fade(0.6, pixel_mm) * lips * c.d1;
+        float s = d.x * (1.0 + 0.10 * noise(q / 6.0)) + 0.55 * noise(q / vec3(1.8, 6.0, 1.8)) + 0.9 * noise(q / vec3(4.5, 9.0, 4.5));
+        float wave = 2.0 * PI / 0.95, g = 0.5 + 0.5 * cos(s * wave);
+        float own = 0.55 + 0.75 * noise(vec3(floor(s / 0.95) * 3.7, q.y / 9.0, 2.0)), held = fade(0.6, pixel_mm);
+        float amp = lip_folds * 0.050 * lips * max(own, 0.1) * held;
+        h.x -= amp * pow(g, 4.0);
+        h.y += amp * 4.0 * g * g * g * 0.5 * sin(s * wave) * wave;
+        float steep = lip_folds * 0.050 * lips * wave;
+        lose(r, 0.25 * steep * steep, held);
+        Spot c = spot(q / 0.8 + 11.0);
+        float dome = exp(-c.f1 * c.f1 / 0.09);
+        h.yzw -= lip_folds * 0.010 * fade(0.6, pixel_mm) * lips * dome / 0.09 * 2.0 * c.d1 / 0.8;
     }
-    return h;
+    r.h = h;
+    return r;
 }
 
-// Skin colour: melanin and haemoglobin as absorbances over a pale dermis, or more of them over what a map shows, one Beer-Lambert law
-// per pigment.
-vec3 colour(vec3 p, float pixel_mm, float pore_shade, bool mapped, vec3 map) {
-    float lips = a.x, flushed = a.y, hair = a.z, eyelid = a.w, beard = beard_tint * b.z, inside = b.w;
+vec3 skin_colour(float m, float h, float thickness) {
+    vec2 n = vec2(textureSize(skin_table, 0));
+    float rows = n.y / skin_blocks;
+    vec2 at = sqrt(clamp(vec2(h, m) / skin_most, 0.0, 1.0)) * (vec2(n.x, rows) - 1.0) + 0.5;
+    float block = clamp((thickness - skin_thinnest) / (1.0 - skin_thinnest), 0.0, 1.0) * (skin_blocks - 1.0);
+    float low = min(floor(block), skin_blocks - 2.0);
+    vec3 thin = texture(skin_table, vec2(at.x, at.y + rows * low) / n).rgb;
+    vec3 thick = texture(skin_table, vec2(at.x, at.y + rows * (low + 1.0)) / n).rgb;
+    return exp(mix(thin, thick, block - low));
+}
+
+// A spot with a ragged border: its height in mm and gradient, as of a dome, times how much of it there is.
+float ragged(vec3 q, float f1, float radius, float size) {
+    return smoothstep(radius, 0.62 * radius, f1 + 0.30 * radius * noise(q / (0.5 * size)) + 0.16 * radius * noise(q / (0.21 * size) + 9.0));
+}
+
+// Moles stand out of the skin: adds to the relief; returns how much of a mole there is.
+float mole_at(vec3 q, float skin, inout vec3 gradient) {
+    if (moles * layer_moles <= 0.0 || mole_share <= 0.0) return 0.0;
+    Spot c = spot(q / 31.0 + 3.0);
+    if (unit(mix_bits(c.id ^ 7u)) < 1.0 - mole_share) return 0.0;
+    float radius = mix(0.018, 0.040, unit(mix_bits(c.id ^ 11u))), r = c.f1 / radius;
+    if (r > 1.5) return 0.0;
+    float e = exp(-2.5 * r * r) * step(0.45, unit(mix_bits(c.id ^ 13u)));  // half of them are flat
+    gradient -= 0.30 * skin * e * 5.0 * c.d1 / (radius * radius * 31.0);
+    return layer_moles * skin * ragged(q, c.f1, radius, 31.0 * radius);
+}
+
+// Skin colour: how much melanin and blood there is, and how thick the epidermis is above it, looked up in the spectral model; over an
+// albedo map the model says by how much more of them darken what it shows.
+vec3 colour(vec3 p, float pixel_mm, float pore, float mole, bool mapped, vec3 map) {
+    float lips = lip_of(a.x), inner = seam_of(a.x), flushed = a.y, hair = a.z, eyelid = a.w, beard = beard_tint * b.z, inside = b.w;
     vec3 q = p + noise_origin;
-    float broad = fbm(q / 38.0), patchy = fbm(q / 9.0 + 4.0), fine = noise(q / 2.2 + 2.0) * fade(1.5, pixel_mm);
-    float m = melanin + 0.045 * broad + 0.040 * patchy + 0.018 * fine + 0.05 * eyelid + 0.060 * pore_shade;
-    float h = blood + flush * flushed + 0.075 * fbm(q / 15.0 + 21.0) + 0.045 * patchy * noise(q / 5.0 + 1.0) + 0.05 * eyelid;
-    if (mapped) { m = 0.060 * pore_shade; h = 0.0; }
+    if (mapped) { lips = 0.0; inner = 0.0; flushed = 0.0; eyelid = 0.0; }
+    float broad = noise(q / 24.0), patchy = noise(q / 9.0 + 4.0), small = noise(q / 3.2 + 40.0), fine = noise(q / 1.3 + 2.0) * fade(0.9, pixel_mm);
+    float red = noise(q / 21.0 + 21.0);
+    // layer_mottling: how even it is; over a map all of this is the map's own
+    float m = melanin * (mapped ? 1.0 : max(1.0 + uneven.x * (0.55 * broad + 0.65 * patchy + 0.45 * small + 0.35 * fine), 0.2));
+    float h = blood + flush * flushed * max(1.0 + 0.8 * uneven.y * (red + patchy), 0.0) + eyelid_blood * eyelid;
+    if (!mapped) h *= max(1.0 + uneven.y * (0.7 * red + 0.5 * noise(q / 6.0 + 61.0)), 0.2);
+    float thickness = mix(1.0, eyelid_epidermis, max(eyelid, 0.7 * min(flushed, 1.0)));  // where blood shows, it lies nearer
+    float m0 = m, h0 = h;
     // capillary mottling, strongest where the skin is flushed
-    h += layer_mottling * mottling * (0.05 + 0.13 * flushed) * max(fbm(q / 3.2 + 40.0), 0.0) * fade(2.0, pixel_mm);
-    // freckles and a few moles
-    Cells c = cells(q / 7.5);
-    float freckle = step(1.0 - freckle_share, unit(mix_bits(c.id ^ 3u))) * smoothstep(0.13, 0.05, c.f1 + 0.03 * noise(q * 2.0));
-    m += layer_freckles * freckles * freckle * (1.0 - lips);
-    Cells spots = cells(q / 31.0 + 3.0);
-    float mole = step(1.0 - mole_share, unit(mix_bits(spots.id ^ 7u))) * smoothstep(0.040, 0.024, spots.f1 + 0.006 * noise(q * 1.7));
-    m += layer_moles * moles * mole * (1.0 - lips);
+    float mottled = 0.7 * small + 0.5 * fine + 0.4 * noise(q / 0.9 + 77.0) * fade(0.6, pixel_mm);
+    h += layer_mottling * mottling * (0.003 + 0.010 * flushed) * 1.2 * max(mottled, 0.0) * (1.0 - lips);
+    // fine vessels where it is flushed most
+    float webbed = vessels * layer_mottling * smoothstep(0.55, 0.95, flushed + 0.25 * patchy) * fade(0.35, pixel_mm) * (1.0 - lips);
+    if (webbed > 0.004) {
+        Cells v = cells((q + 0.55 * vec3(small, fine, patchy)) / 2.6 + 50.0);
+        float broken = smoothstep(-0.1, 0.5, noise(q / 1.9 + 33.0));
+        h += webbed * broken * exp(-pow((v.f2 - v.f1) / 0.055, 2.0));
+    }
+    // freckles
+    Spot c = spot(q / 7.5);
+    float one = unit(mix_bits(c.id ^ 3u)), of = unit(mix_bits(c.id ^ 5u));
+    if (one > 1.0 - freckle_share && c.f1 < 0.24)
+        m += layer_freckles * freckles * (0.4 + 0.6 * of) * ragged(q, c.f1, mix(0.05, 0.13, of), 0.8) * (1.0 - lips);
+    m += moles * mole;
+    // lips: redder towards the seam, under a thin epidermis
+    float vermilion = mix(lip_blood.x, lip_blood.y, inner) * (1.0 + 0.20 * patchy + 0.22 * small + 0.16 * fine);
+    m *= mix(1.0, lip_melanin, lips);
+    h = mix(h, vermilion, lips);
+    thickness = mix(thickness, lip_epidermis, lips);
     // hair below the surface: scalp and shaven beard, dots that merge with distance
-    Cells d = cells(q / 0.85 + 8.0);
-    float dots = mix(0.22, smoothstep(0.34, 0.16, d.f1), fade(0.9, pixel_mm));
     hair *= layer_hair;
     beard *= layer_hair;
-    float rooted = clamp(hair + 0.75 * beard, 0.0, 1.0) * (0.75 + 0.25 * noise(q / 4.0));
-    vec3 skin = (mapped ? map : dermis) * exp(-m * melanin_absorbance - h * blood_absorbance);
-    vec3 lip_colour = lip * (1.0 + 0.10 * fbm(q / 2.5) + 0.06 * noise(q / 0.9));
-    if (!mapped) skin = mix(skin, lip_colour, 0.88 * smoothstep(0.12, 0.85, lips + 0.10 * noise(q / 1.3)));
-    skin *= mix(vec3(1.0), vec3(0.42, 0.40, 0.40), hair * scalp_tint) * (1.0 - rooted * vec3(0.20, 0.18, 0.15) - 0.45 * dots * rooted);
-    if (!mapped) skin = mix(skin, vec3(0.30, 0.07, 0.06), inside);
-    return skin;
+    float rooted = clamp(hair + 0.75 * beard, 0.0, 1.0) * (0.75 + 0.25 * noise(q / 4.0)), dots = 0.10;
+    if (rooted > 0.02) {
+        Spot d = spot(q / 0.62 + 8.0);
+        dots = mix(0.10, smoothstep(0.17, 0.07, d.f1), fade(0.45, pixel_mm));
+    }
+    vec3 skin = skin_colour(m / thickness, h, thickness);  // melanin lies at the epidermis's base: a thin one has as much of it
+    if (mapped) skin = map * skin / skin_colour(m0 / thickness, h0, thickness);
+    skin *= mix(vec3(1.0), scalp_left, hair * scalp_tint) * (1.0 - rooted * rooted_left - 0.45 * dots * rooted);
+    skin *= 1.0 - pore_darkness * min(pore, 1.0);
+    return mapped ? skin : mix(skin, inside_colour, inside);
 }
 
 // A normal turned by the height map: Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU", doi:10.1080/2151237X.2010.10390651.
@@ -167,25 +268,23 @@ vec3 bumped(vec3 n) {
 }
 
 float strength;  // of specular light, after its map
+// Two lobes of Beckmann slopes: roughness of each, the share of the second, reflectance at normal incidence.
+vec2 lobes; float second; float normal_f0;
 
 // The share of the light that the two lobes send back, of light from a direction or from everywhere.
 float sent_back(vec3 one, vec3 two) {
-    float back = mix(dot(vec2(f0, 1.0), one.xy), dot(vec2(f0, 1.0), two.xy), lobe_share);
+    float back = mix(dot(vec2(normal_f0, 1.0), one.xy), dot(vec2(normal_f0, 1.0), two.xy), second);
     return clamp(strength * back, 0.0, 1.0);
 }
-float sent_back(float cosine, float m) {
-    return sent_back(face(cosine, m * lobe_roughness.x), face(cosine, min(m * lobe_roughness.y, 0.9)));
-}
-float sent_back_even(float m) {
-    return sent_back(face_even(m * lobe_roughness.x), face_even(min(m * lobe_roughness.y, 0.9)));
-}
+float sent_back(float cosine) { return sent_back(face(cosine, lobes.x), face(cosine, lobes.y)); }
+float sent_back_even() { return sent_back(face_even(lobes.x), face_even(lobes.y)); }
 // What of a lamp's light goes in, and what of even light. Over an atlas or points nobody looks on.
 float goes_in(vec3 n, vec3 v, vec3 l, float m) {
 #if DIFFUSE == DISNEY
     float lh = dot(l, normalize(l + v)), f90 = 0.5 + 2.0 * m * lh * lh;
     return (1.0 + (f90 - 1.0) * pow(1.0 - dot(n, l), 5.0)) * (1.0 + (f90 - 1.0) * pow(1.0 - max(dot(n, v), 0.0), 5.0));
 #elif DIFFUSE == CONSERVING
-    return 1.0 - sent_back(dot(n, l), m);
+    return 1.0 - sent_back(dot(n, l));
 #else
     return 1.0;
 #endif
@@ -194,7 +293,7 @@ float goes_in_even(float nv, float m) {
 #if DIFFUSE == DISNEY
     return face(nv, m).z;
 #elif DIFFUSE == CONSERVING
-    return 1.0 - sent_back_even(m);
+    return 1.0 - sent_back_even();
 #else
     return 1.0;
 #endif
@@ -213,7 +312,8 @@ void main() {
     vec3 n = smooth_n;
     vec3 albedo = albedo_colour;
     float m = roughness;
-    float shade = 0.0;
+    float shade = 0.0, mole = 0.0, lost = 0.0;
+    second = lobe_share; normal_f0 = f0;
     if (has_albedo_map == 1) albedo = from_srgb(map_at(albedo_map, uv).rgb);
     if (has_normal_map == 1) {
         vec3 dp1 = step_x, dp2 = step_y;
@@ -227,20 +327,45 @@ void main() {
         }
     }
     if (has_height_map == 1) n = bumped(n);
+    vec3 mirror = n;
     if (procedural == 1) {
-        if (layer_relief > 0.0) {
-            vec4 h = relief(local, pixel_mm, shade);
-            vec3 slope = mat3(model) * h.yzw / length(model[0].xyz);  // relief grows with its object
+        if (layer_relief > 0.0 || layer_moles > 0.0) {
+            vec3 raised = vec3(0.0);
+            mole = mole_at(local + noise_origin, (1.0 - lip_of(a.x)) * (1.0 - b.w), raised);
+            Relief r; r.h = vec4(0.0); r.fine = vec3(0.0); r.pore = 0.0; r.lost = 0.0;
+            if (layer_relief > 0.0) r = relief(local, pixel_mm);
+            shade = min(r.pore, 1.0);
+            lost = r.lost;
+            vec3 slope = mat3(model) * (r.h.yzw + raised) / length(model[0].xyz);  // relief grows with its object
+            vec3 finer = slope + mat3(model) * r.fine / length(model[0].xyz);
+            mirror = normalize(n - (finer - n * dot(finer, n)));
             n = normalize(n - (slope - n * dot(slope, n)));
         }
-        albedo = colour(local, pixel_mm, shade, has_albedo_map == 1, albedo);
-        if (layer_oil > 0.0) m = mix(roughness_dry, roughness_oily, b.y) - 0.08 * a.x + 0.03 * noise((local + noise_origin) / 3.0);
+        albedo = colour(local, pixel_mm, shade, mole, has_albedo_map == 1, albedo);
+        if (layer_oil > 0.0) {
+            vec3 q = local + noise_origin;
+            float patches = 0.45 * noise(q / 21.0 + 91.0) + 0.40 * noise(q / 7.0 + 87.0) + 0.30 * noise(q / 2.0 + 83.0) * fade(1.4, pixel_mm);
+            float lips = lip_of(a.x);
+            float oil = clamp(b.y * (1.0 + oil_patches * patches) - 0.35 * shade, 0.0, 1.0);
+            m = mix(mix(roughness_dry, roughness_oily, oil), roughness_lips * mix(1.15, 0.85, seam_of(a.x)), lips);
+            second = mix(mix(lobe_share, lobe_share_oily, oil), lobe_share_oily, lips);
+            normal_f0 = mix(f0, f0_oily, max(oil, 0.0));
+        }
     }
     if (has_roughness_map == 1) m = clamp(map_at(roughness_map, uv).r, 0.12, 0.9);
+    // What is too fine for a pixel widens the lobes: slopes of a mean square s add s to m^2. The smooth surface's own turn within a pixel
+    // does so too (Tokuyoshi and Kaplanyan 2019).
+    float bend = lost;
+#if DOMAIN == SCREEN
+    vec3 turn_x = dFdx(smooth_n), turn_y = dFdy(smooth_n);
+    bend += min(0.5 * (dot(turn_x, turn_x) + dot(turn_y, turn_y)), 0.18);
+#endif
+    lobes = clamp(sqrt(m * m * lobe_roughness * lobe_roughness + bend), 0.03, 0.9);
     strength = specular_strength;
     if (has_specular_map == 1) strength *= map_at(specular_map, uv).r;
 #if DOMAIN == SCREEN
     if (dot(n, v) < 0.02) n = normalize(n + v * (0.02 - dot(n, v)));
+    if (dot(mirror, v) < 0.02) mirror = normalize(mirror + v * (0.02 - dot(mirror, v)));
 #endif
 
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
@@ -248,33 +373,41 @@ void main() {
     float nv = max(dot(n, v), 0.02);
     irradiance *= goes_in_even(nv, m);
     vec3 specular = vec3(0.0);  // left out with DIFFUSE_ONLY
-    float wet = a.x;
+    float shown = (1.0 - 0.6 * shade) * (1.0 - 0.85 * b.w);
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world);
         float nl = dot(n, l), geometric = dot(smooth_n, l);
-        if (geometric > -0.08 && nl > 0.0) {
-            vec3 e = lamp_light(k, world) * nl * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
-            irradiance += e * goes_in(n, v, l, m);
+#ifdef DIFFUSE_ONLY
+        float ml = 0.0;
+#else
+        float ml = dot(mirror, l);
+#endif
+        if (geometric > -0.08 && max(nl, ml) > 0.0) {
+            vec3 e = lamp_light(k, world) * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
+            if (nl > 0.0) irradiance += e * nl * goes_in(n, v, l, m);
 #ifndef DIFFUSE_ONLY
-            float lobe = (1.0 - lobe_share) * kelemen(n, v, l, m * lobe_roughness.x, f0) + lobe_share * kelemen(n, v, l, min(m * lobe_roughness.y, 0.9), f0);
-            specular += e * lobe * (1.0 - 0.5 * min(shade, 1.0)) * (1.0 - 0.85 * b.w);
+            vec2 wide = sqrt(lobes * lobes + lamp_spread(k, world));
+            if (ml > 0.0) specular += e * ml * shown * mix(kelemen(mirror, v, l, wide.x, normal_f0), kelemen(mirror, v, l, wide.y, normal_f0), second);
 #endif
         }
     }
 #ifndef DIFFUSE_ONLY
-    // panels in the mirror direction, shadowed by the baked openness
-    vec3 r = reflect(-v, n);
-    float rough = m * 1.1;
-    float occlusion = clamp(pow(nv + open_sky, exp2(-16.0 * rough - 1.0)) - 1.0 + open_sky, 0.0, 1.0);  // Lagarde and de Rousiers 2014
-    float f = f0 + 0.30 * pow(1.0 - nv, 5.0) * (1.0 - rough);
-    specular += environment(r, 2.0 / (rough * rough)) * f * (1.0 - 0.5 * min(shade, 1.0)) * occlusion * (1.0 - 0.9 * b.w);
+    // the environment in the mirror's direction through each lobe, shadowed by the baked openness
+    vec3 r = reflect(-v, mirror);
+    float mv = max(dot(mirror, v), 0.02);
+    for (int k = 0; k < 2; ++k) {
+        float rough = k == 0 ? lobes.x : lobes.y;
+        float occlusion = clamp(pow(nv + open_sky, exp2(-16.0 * rough - 1.0)) - 1.0 + open_sky, 0.0, 1.0);  // Lagarde and de Rousiers 2014
+        float back = dot(vec2(normal_f0, 1.0), face(mv, rough).xy);
+        specular += (k == 0 ? 1.0 - second : second) * environment(r, 2.0 / (rough * rough)) * back * shown * occlusion;
+    }
 #endif
 
     vec3 dark = mix(vec3(1.0), vec3(0.35), b.w);
     float mask = material_id * step(0.5, scatters);
     out_irradiance = vec4(irradiance * dark, mask);
     out_specular = vec4(strength * specular, 1.0);
-    out_albedo = vec4(albedo, 1.0 - sent_back(nv, m));
+    out_albedo = vec4(albedo, 1.0 - sent_back(nv));
     put_place(n);
 #if DOMAIN != SCREEN
     vec3 through = vec3(0.0);

@@ -16,6 +16,7 @@ from renderer import caches, gl
 from renderer.errors import InputError
 from renderer.gl import GL
 from renderer.optics import media, surface
+from renderer.optics import skin as spectral
 from renderer.optics.curve import Curve
 from renderer.optics.transmittance import TABLE, THICKNESS, Translucency, curve_of
 from renderer.passes.bake import Baked, Body, bake, body
@@ -25,7 +26,17 @@ from renderer.passes.points import COLUMNS, MOST_TRIANGLES, Points, SurfaceLists
 from renderer.scene import lights as lamps_of_a_scene
 from renderer.scene import maps as maps_of_a_scene
 from renderer.scene.graph import Contents, Item
-from renderer.scene.material import LAYERS, MAPS, MODELS, Material, Shading, Skin
+from renderer.scene.material import (
+    INSIDE,
+    LAYERS,
+    MAPS,
+    MODELS,
+    ROOTED,
+    SCALP,
+    Material,
+    Shading,
+    Skin,
+)
 from renderer.scene.model import MASKS
 
 _HALF = GL.GL_RGBA16F
@@ -34,6 +45,32 @@ FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, GL.GL_R32F)
 #: Over an atlas or points: the normal in the depth's stead, what comes through, the place in the
 #: world.
 PLACED_FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, _HALF, _HALF, GL.GL_RGBA32F)
+
+#: Fields of a skin that passes/skin.frag takes under their own names.
+SKIN_UNIFORMS = (
+    "melanin",
+    "blood",
+    "flush",
+    "mottling",
+    "uneven",
+    "eyelid_blood",
+    "eyelid_epidermis",
+    "lip_blood",
+    "lip_melanin",
+    "lip_epidermis",
+    "freckles",
+    "freckle_share",
+    "moles",
+    "mole_share",
+    "vessels",
+    "micro_mm",
+    "f0_oily",
+    "roughness_dry",
+    "roughness_oily",
+    "roughness_lips",
+    "lobe_share_oily",
+    "oil_patches",
+)
 
 #: The code that baked light follows from.
 BAKED_BY = [
@@ -75,6 +112,7 @@ class Surfaces:
         bodies = [body(item) for item in items]
         baked = _baked(bodies, lights, surroundings, rays, seed) if bodies else []
         self.media: list[str | dict] = []
+        self._skin_tables: dict[spectral.Layers, gl.Texture] = {}
         self._transmittances: dict[tuple[int, str, str], tuple[gl.Texture, float]] = {}
         self.surfaces = [
             self._surface(item, b) for item, b in zip(contents.surfaces, baked, strict=False)
@@ -250,20 +288,17 @@ class Surfaces:
             "lobe_roughness": material.lobe_roughness,
             "lobe_share": material.lobe_share,
             "material_id": float(drawn.id),
-            "melanin": skin.melanin,
-            "blood": skin.blood,
-            "flush": skin.flush,
-            "mottling": skin.mottling,
-            "melanin_absorbance": skin.melanin_absorbance,
-            "blood_absorbance": skin.blood_absorbance,
-            "dermis": skin.dermis,
-            "lip": skin.lip,
-            "freckles": skin.freckles,
-            "freckle_share": skin.freckle_share,
-            "moles": skin.moles,
-            "mole_share": skin.mole_share,
+            "skin_table": self._skin_table(skin),
+            "skin_most": (spectral.MOST_BLOOD, spectral.MOST_MELANIN),
+            "skin_thinnest": spectral.THINNEST,
+            "skin_blocks": float(spectral.SIZE[0]),
+            **{name: getattr(skin, name) for name in SKIN_UNIFORMS},
             "beard_tint": skin.beard,
             "scalp_tint": skin.scalp,
+            "scalp_left": SCALP,
+            "rooted_left": ROOTED,
+            "inside_colour": INSIDE,
+            "pore_darkness": skin.pore_shade,
             "pore_depth": skin.pores,
             "furrow_depth": skin.furrows,
             "bump_height": skin.bumps,
@@ -279,10 +314,20 @@ class Surfaces:
             "lid_lines_period": skin.lid_lines_period_mm,
             "wrinkles_behind": skin.wrinkles_behind_mm,
             "lip_folds": skin.lip_folds,
-            "roughness_dry": skin.roughness_dry,
-            "roughness_oily": skin.roughness_oily,
             **(_local(material) if isinstance(material, Shading) else {}),
         }
+
+    def _skin_table(self, material: Skin) -> gl.Texture:
+        """The spectral model's table of colours for a skin, made once."""
+        layers = material.layers
+        if layers not in self._skin_tables:
+            values = spectral.table(layers)
+            blocks, rows, columns, _ = values.shape
+            texels = np.zeros((blocks * rows, columns, 4), np.float32)
+            texels[..., :3] = values.reshape(-1, columns, 3)
+            size = (columns, blocks * rows, GL.GL_RGBA32F)
+            self._skin_tables[layers] = gl.Texture(*size, linear=True, data=texels)
+        return self._skin_tables[layers]
 
     def points(
         self, drawn: Drawn, faces: np.ndarray, weights: np.ndarray, columns: int = COLUMNS

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
 from renderer.errors import InputError
+from renderer.optics import skin
 from renderer.parameters import Parameters, parameter, weights
 
 #: What a head's masks say, in the order of their columns: how much of each, in [0, 1].
@@ -21,7 +22,11 @@ LAYERS = ("relief", "freckles", "moles", "mottling", "hair", "oil")
 _SHARE = {"low": 0.0, "high": 1.0}
 # Means of the shader's noises, by integration: of a freckle's cell, of the positive part of four
 # octaves, of the dots below the surface.
-FRECKLE_AREA, MOTTLING_MEAN, DOTS_MEAN = 0.03, 0.09, 0.22
+FRECKLE_AREA, MOTTLING_MEAN, DOTS_MEAN = 0.01, 0.15, 0.10
+# What hair in and over the skin leaves of its colour, and the colour of the mouth's inside.
+SCALP, ROOTED, INSIDE = (0.22, 0.21, 0.21), (0.30, 0.27, 0.24), (0.22, 0.06, 0.06)
+#: The medium of a skin that follows from its own pigments.
+PERSON = "person"
 
 
 @dataclass(frozen=True)
@@ -117,6 +122,14 @@ def _band(*default: float) -> Any:
     return parameter(default, unit="mm", low=-500.0, high=500.0, source="by eye")
 
 
+def _layers(name: str) -> Any:
+    """The parameter of the spectral model."""
+    field = {f.name: f for f in fields(skin.Layers)}[name]
+    return parameter(
+        field.default, **{k: field.metadata[k] for k in ("unit", "source", "low", "high")}
+    )
+
+
 def _period(default: float) -> Any:
     return parameter(default, unit="mm", low=0.1, high=100.0, source="by eye")
 
@@ -135,6 +148,10 @@ _BANDS = (
 class Skin(Material):
     """Procedural skin: pigments, pores, furrows and hair below the surface over the solid noise.
 
+    Colour follows from melanin, blood and the epidermis by renderer.optics.skin; with `medium =
+    "person"` so does the medium below, from the mean over the face. Highlights are two lobes, whose
+    roughness is that between the relief: what of the relief is too fine for a pixel is added to it.
+
     The masks of a head (lips, flush, beard, ...) say where; on a surface that brings none, `masks`
     says how much of each there is everywhere. map_layers: those of LAYERS that also lie over an
     albedo map, which stands for the pigments and the lips.
@@ -152,41 +169,72 @@ class Skin(Material):
     masks: dict[str, float] = field(default_factory=dict)
 
     melanin: float = parameter(
-        0.20, unit="optical depth", low=0.0, high=8.0, source="chosen by eye; darker is more"
+        0.024, unit="volume share of the epidermis", low=0.0, high=0.6, source="by eye"
     )
-    blood: float = parameter(0.21, unit="optical depth", low=0.0, high=4.0, source="chosen by eye")
-    melanin_absorbance: tuple[float, float, float] = parameter(
-        (0.55, 1.15, 1.75), low=0.0, high=10.0, source="chosen by eye after Jacques 2013"
+    blood: float = parameter(
+        0.012, unit="volume share of the dermis", low=0.0, high=0.3, source="by eye"
     )
-    blood_absorbance: tuple[float, float, float] = parameter(
-        (0.12, 1.05, 0.85), low=0.0, high=10.0, source="chosen by eye after Jacques 2013"
-    )
-    dermis: tuple[float, float, float] = parameter(
-        (0.770, 0.610, 0.520), source="pale dermis without pigment, chosen by eye", **_SHARE
-    )
-    lip: tuple[float, float, float] = parameter(
-        (0.50, 0.215, 0.195), source="chosen by eye", **_SHARE
-    )
-    flush: float = parameter(0.34, unit="optical depth", low=0.0, high=4.0, source="by eye")
+    eumelanin: float = _layers("eumelanin")
+    oxygenation: float = _layers("oxygenation")
+    epidermis_mm: float = _layers("epidermis_mm")
+    turbidity: float = _layers("turbidity")
+    flush: float = parameter(0.026, unit="share of blood more", low=0.0, high=0.3, source="by eye")
     mottling: float = parameter(1.0, low=0.0, high=5.0, source="of what was chosen by eye")
+    uneven: tuple[float, float] = parameter(
+        (0.30, 0.26), unit="of melanin, of blood", low=0.0, high=2.0, source="by eye"
+    )
+    eyelid_blood: float = parameter(
+        0.006, unit="share of blood more", low=0.0, high=0.3, source="by eye"
+    )
+    eyelid_epidermis: float = parameter(0.55, source="of the epidermis, by eye", low=0.1, high=1.0)
+    lip_blood: tuple[float, float] = parameter(
+        (0.034, 0.080), unit="share of blood: border, seam", low=0.0, high=0.3, source="by eye"
+    )
+    lip_melanin: float = parameter(0.45, source="of the skin's melanin, by eye", **_SHARE)
+    lip_epidermis: float = parameter(0.40, source="of the epidermis, by eye", low=0.1, high=1.0)
     freckles: float = parameter(
-        0.14, unit="optical depth", low=0.0, high=4.0, source="chosen by eye"
+        0.030, unit="share of melanin more", low=0.0, high=0.6, source="by eye"
     )
     freckle_share: float = parameter(0.28, source="of cells of 7.5 mm, by eye", **_SHARE)
-    moles: float = parameter(0.65, unit="optical depth", low=0.0, high=4.0, source="by eye")
+    moles: float = parameter(0.25, unit="share of melanin more", low=0.0, high=0.6, source="by eye")
     mole_share: float = parameter(0.20, source="of cells of 31 mm, by eye", **_SHARE)
+    vessels: float = parameter(
+        0.05, unit="share of blood more", low=0.0, high=0.3, source="fine ones, by eye"
+    )
     beard: float = parameter(1.0, low=0.0, high=1.3, source="tint of shaven skin, by eye")
     scalp: float = parameter(0.9, source="darkening under hair, by eye", **_SHARE)
-    pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.042 and 0.022 mm")
-    furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.015 mm")
+    pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.050 and 0.026 mm")
+    pore_shade: float = parameter(0.22, source="how much darker a deep pore is, by eye", **_SHARE)
+    furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.018 mm")
     bumps: float = parameter(1.0, low=0.0, high=5.0, source="height, of 0.022 to 0.16 mm")
     wrinkles: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.020 to 0.045 mm")
-    lip_folds: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.040 mm")
+    lip_folds: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.050 mm")
+    micro_mm: tuple[float, float] = parameter(
+        (0.030, 0.018),
+        unit="mm over 0.62 and 0.34 mm",
+        low=0.0,
+        high=0.2,
+        source="relief that only the mirror sees, by eye",
+    )
+    f0_oily: float = parameter(
+        0.035, low=0.0, high=1.0, source="Fresnel at an index of 1.46, of sebum"
+    )
     roughness_dry: float = parameter(
-        0.42, unit="Beckmann slope", low=0.02, high=1.0, source="chosen by eye"
+        0.34, unit="Beckmann slope", low=0.02, high=1.0, source="between relief, by eye"
     )
     roughness_oily: float = parameter(
-        0.27, unit="Beckmann slope", low=0.02, high=1.0, source="chosen by eye"
+        0.21, unit="Beckmann slope", low=0.02, high=1.0, source="between relief, by eye"
+    )
+    roughness_lips: float = parameter(
+        0.18, unit="Beckmann slope", low=0.02, high=1.0, source="moist, by eye"
+    )
+    lobe_roughness: tuple[float, float] = parameter(
+        (0.55, 1.35), unit="of the roughness", low=0.1, high=3.0, source="by eye"
+    )
+    lobe_share: float = parameter(0.80, source="of the broad lobe on dry skin, by eye", **_SHARE)
+    lobe_share_oily: float = parameter(0.45, source="of it on oily skin, by eye", **_SHARE)
+    oil_patches: float = parameter(
+        0.55, low=0.0, high=2.0, source="of the oil there is, over 21, 7 and 2 mm, by eye"
     )
 
     forehead_lines_mm: tuple[float, float, float, float] = _band(24.0, 32.0, 58.0, 66.0)
@@ -208,6 +256,11 @@ class Skin(Material):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.medium == PERSON and (self.coatings or self.thickness != "solid"):
+            raise InputError(
+                f"{self.where('medium')} is {PERSON!r} with a thickness or coatings; expected "
+                "neither, its layers are the skin's own"
+            )
         for name in self.map_layers:
             if name not in LAYERS:
                 known = ", ".join(LAYERS)
@@ -221,26 +274,56 @@ class Skin(Material):
             if any(low >= high for low, high in pairwise(band)):
                 raise InputError(f"{self.where(name)} is {band}; expected places that rise")
 
-    def mean_albedo(self, masks: np.ndarray) -> np.ndarray:
-        """Linear albedo (N, 3) at the scale of bounced light, from masks (N, 8).
+    @property
+    def layers(self) -> skin.Layers:
+        """What the spectral model takes as the same everywhere."""
+        names = skin.Layers.names()
+        return skin.Layers(**{name: getattr(self, name) for name in names})
 
-        What `colour` of passes/skin.frag averages to where its noises are zero on average.
+    def pigments(self, masks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Melanin, blood and thickness of the epidermis (of its own) at masks (N, 8): (N,) each.
+
+        Melanin lies at the epidermis's base, so that a thin one has as much of it.
+
+        What `pigments` of passes/skin.frag averages to where its noises are zero on average.
         """
+        column = {name: masks[:, k] for k, name in enumerate(MASKS)}
+        lips, inner = lip_places(column["lips"])
+        eyelid, flushed = column["eyelid"], column["flush"]
+        freckles = self.freckles * self.freckle_share * FRECKLE_AREA * (1 - lips)
+        melanin = self.melanin * (1 + (self.lip_melanin - 1) * lips) + freckles
+        blood = self.blood + self.flush * flushed + self.eyelid_blood * eyelid
+        blood = blood + self.mottling * (0.003 + 0.010 * flushed) * MOTTLING_MEAN
+        border, seam = self.lip_blood
+        blood = blood + lips * (border + (seam - border) * inner - blood)
+        thin = 1 + (self.eyelid_epidermis - 1) * np.maximum(eyelid, 0.7 * flushed)
+        thin = thin + lips * (self.lip_epidermis - thin)
+        return melanin / thin, blood, thin
+
+    def mean_albedo(self, masks: np.ndarray) -> np.ndarray:
+        """Linear albedo (N, 3) at the scale of bounced light, from masks (N, 8)."""
         column = {name: masks[:, k : k + 1] for k, name in enumerate(MASKS)}
-        lips, flushed, hair, inside = (column[n] for n in ("lips", "flush", "hair", "inside"))
-        melanin = self.melanin + 0.05 * column["eyelid"]
-        melanin = melanin + self.freckles * self.freckle_share * FRECKLE_AREA * (1 - lips)
-        blood = self.blood + self.flush * flushed + 0.05 * column["eyelid"]
-        blood = blood + self.mottling * (0.05 + 0.13 * flushed) * MOTTLING_MEAN
-        depth = melanin * np.array(self.melanin_absorbance)
-        depth = depth + blood * np.array(self.blood_absorbance)
-        albedo = np.array(self.dermis) * np.exp(-depth)
-        share = 0.88 * _smoothstep(0.12, 0.85, lips)
-        albedo = albedo + share * (np.array(self.lip) - albedo)
-        rooted = 0.75 * np.clip(hair + 0.75 * self.beard * column["beard"], 0, 1)
-        albedo = albedo * (1 + self.scalp * hair * (np.array([0.42, 0.40, 0.40]) - 1))
-        albedo = albedo * (1 - rooted * np.array([0.20, 0.18, 0.15]) - 0.45 * DOTS_MEAN * rooted)
-        return albedo + inside * (np.array([0.30, 0.07, 0.06]) - albedo)
+        albedo = skin.shown(self.layers, *self.pigments(masks))
+        rooted = 0.75 * np.clip(column["hair"] + 0.75 * self.beard * column["beard"], 0, 1)
+        albedo = albedo * (1 + self.scalp * column["hair"] * (np.array(SCALP) - 1))
+        albedo = albedo * (1 - rooted * np.array(ROOTED) - 0.45 * DOTS_MEAN * rooted)
+        return albedo + column["inside"] * (np.array(INSIDE) - albedo)
+
+    def own_medium(self, masks: np.ndarray, share: np.ndarray) -> dict:
+        """The medium of `medium = "person"`: the layers whose albedo is the mean of what is shown.
+
+        masks (N, 8); share (N,): the weight of each place, which is its area on a face.
+        """
+        share = share / share.sum()
+        melanin, blood, _ = (share @ value for value in self.pigments(masks))
+        return skin.medium(self.layers, share @ self.mean_albedo(masks), melanin, blood)
+
+
+def lip_places(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """From the mask of lips, which is 0.5 at their border and 1 at the seam: how much of lip there
+    is, and how near the seam; in [0, 1].
+    """
+    return _smoothstep(0.0, 0.6, mask), np.clip(2 * mask - 1, 0, 1)
 
 
 def _smoothstep(low: float, high: float, x: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from renderer.optics import media
 from renderer.parameters import plain, refuse_unknown
 from renderer.scene.camera import Camera
 from renderer.scene.lights import Environment, Light, read_light
-from renderer.scene.material import Material, read_material
+from renderer.scene.material import PERSON, Material, Skin, read_material
 from renderer.scene.objects import Object, read_object
 from renderer.scene.picture import Picture
 
@@ -54,7 +54,8 @@ class Scene:
                     f"{where}.objects.{name}.material is {thing.material!r}; expected {known}"
                 )
         for name, material in materials.items():
-            if material.scatters:
+            own = isinstance(material, Skin) and material.medium == PERSON
+            if material.scatters and not own:
                 medium = media.read(material.layered(), f"{where}.materials.{name}.medium")
                 if medium.channels != 3:
                     raise InputError(

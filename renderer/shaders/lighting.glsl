@@ -86,6 +86,13 @@ float visibility(int lamp, vec3 p, vec3 n, float phase) {
     return lit * through / 12.0;
 }
 
+// What a lamp's size adds to the squared Beckmann slope of a mirror that shows it: a disc of the tangent t is t/2 of slopes of the half
+// vector, whose variance is t^2/16 along each axis.
+float lamp_spread(int lamp, vec3 p) {
+    float t = distant(lamp) ? lamp_size[lamp] : lamp_size[lamp] / max(length(lamp_place[lamp].xyz - p), 1.0);
+    return 0.125 * t * t;
+}
+
 float schlick(float f0, float cosine) { return f0 + (1.0 - f0) * pow(clamp(1.0 - cosine, 0.0, 1.0), 5.0); }
 
 // Kelemen and Szirmay-Kalos 2001 with a Beckmann distribution (1/pi: radiometric units); half vector not normalised.

@@ -21,6 +21,9 @@ PLACES = (
     "chest",
     "neck",
     "eyelids",
+    "rings",
+    "rims",
+    "knuckle",
 )
 _LINES = ("hairline", "beard_top", "beard_bottom")
 _RAMPS = (
@@ -40,7 +43,10 @@ _WEIGHTS = {
         "cheeks": 0.55,
         "nose": 0.75,
         "wings": 0.5,
-        "ears": 0.62,
+        "ears": 0.10,
+        "rims": 0.62,
+        "rings": 0.14,
+        "knuckle": 0.30,
         "chin": 0.28,
         "forehead": 0.16,
         "chest": 0.16,
@@ -66,6 +72,7 @@ _WEIGHTS = {
         "neck": -0.2,
     },
     "smooth": {"eyelids": 0.85, "ears": 0.6},
+    "thin": {"eyelids": 1.0, "rings": 0.45, "rims": 0.3},
 }
 
 # fmt: off
@@ -100,8 +107,10 @@ class Regions(Parameters):
 
     hairline, beard_top, beard_bottom: points (azimuth from the face's middle in degrees, 0 to 180
     and rising; height above the eyes in mm) of lines that both sides share. flush, pores, oil: how
-    much of it lies at each of PLACES, summed; smooth: the share of pores that is missing there. A
-    table goes over the defaults place by place.
+    much of it lies at each of PLACES, summed; smooth: the share of pores that is missing there;
+    thin: where the epidermis is as thin as on a lid. A table goes over the defaults place by place.
+    rings lie below the eyes, rims are those of the ears with their lobes, the knuckle is the
+    nose's.
 
     The lines wander by line_noise_mm (hairline, top and bottom of the beard) over
     line_noise_scale_mm. Ramps say where something begins and where it is whole: *_soft_mm across a
@@ -141,6 +150,23 @@ class Regions(Parameters):
         high=100.0,
         source="by eye",
     )
+    rings_place_mm: tuple[float, float] = parameter(
+        (1.0, 12.5), unit="mm inwards of and below each eye", low=-50.0, high=50.0, source="by eye"
+    )
+    rings_mm: tuple[float, float] = parameter(
+        (12.0, 4.2), unit="mm across, along", low=1.0, high=50.0, source="of a soft spot, by eye"
+    )
+    rims_mm: tuple[float, float] = parameter(
+        (30.0, 17.0),
+        unit="mm, half height and half depth of an ear",
+        low=5.0,
+        high=60.0,
+        source="by eye",
+    )
+    knuckle_place_mm: tuple[float, float] = parameter(
+        (23.0, 7.0), unit="mm above and behind the nose's tip", low=0.0, high=60.0, source="by eye"
+    )
+    knuckle_mm: float = _radius(6.0)
     nose_mm: float = _radius(11.0)
     wings_mm: float = _radius(8.0)
     cheek_mm: float = _radius(17.0)
@@ -152,6 +178,7 @@ class Regions(Parameters):
     pores: dict[str, float] = field(default_factory=dict)
     oil: dict[str, float] = field(default_factory=dict)
     smooth: dict[str, float] = field(default_factory=dict)
+    thin: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -31,6 +31,52 @@ def _wobble(p: np.ndarray, scale: float) -> np.ndarray:
     return sum(np.sin(q @ np.array(w[:3]) + w[3]) for w in waves) / len(waves) * 1.6
 
 
+def _ring(p: np.ndarray, eye: np.ndarray, regions: Regions) -> np.ndarray:
+    """The soft spot below an eye (N,)."""
+    inwards, below = regions.rings_place_mm
+    across, along = regions.rings_mm
+    x = p[:, 0] - eye[0] + np.sign(eye[0]) * inwards
+    y = p[:, 1] - eye[1] + below - 0.012 * x**2  # it curves up to the corners
+    return np.exp(-0.5 * ((x / across) ** 2 + (y / along) ** 2)) * (p[:, 2] > eye[2])
+
+
+def _rim(p: np.ndarray, ear: np.ndarray, regions: Regions) -> np.ndarray:
+    """The rim and the lobe of the ear about `ear`, of what is ear (N,)."""
+    high, deep = regions.rims_mm
+    off = p - ear
+    out = np.hypot(off[:, 1] / high, off[:, 2] / deep)
+    lobe = smoothstep(-0.45 * high, -0.8 * high, off[:, 1])
+    return np.maximum(smoothstep(0.7, 1.0, out), lobe) * (np.abs(off[:, 0]) < 40)
+
+
+#: Over how many mm the vermilion fades into the skin outside of its border.
+BORDER_MM = 1.4
+
+
+def _lips(p: np.ndarray, own: dict[str, np.ndarray]) -> np.ndarray:
+    """Lips (N,): 0 outside, 0.5 at their border, 1 at the seam, where the mouth's inside begins."""
+    from scipy.spatial import cKDTree
+
+    inside = own["inside-mouth"] > 0.5
+    lip = (own["lips"] > 0.5) & ~inside
+    out = np.zeros(len(p))
+    if not lip.any():
+        return out
+    skin = ~lip & ~inside
+    reach = 15.0
+
+    def distance(of: np.ndarray, to: np.ndarray) -> np.ndarray:
+        if not to.any():
+            return np.full(of.sum(), reach)
+        return np.minimum(cKDTree(p[to]).query(p[of], distance_upper_bound=reach)[0], reach)
+
+    border, seam = distance(lip, skin), distance(lip, inside)
+    out[lip] = 0.5 + 0.5 * border / (border + seam)
+    out[skin] = 0.5 * (1 - smoothstep(0.0, BORDER_MM, distance(skin, lip)))
+    out[inside] = 1 - smoothstep(0.0, 4.0, distance(inside, lip))
+    return out
+
+
 def azimuth(p: np.ndarray) -> np.ndarray:
     """Degrees from the face's middle, 0 to 180, either side (N,)."""
     return np.degrees(np.arctan2(np.abs(p[:, 0]), p[:, 2] - HEAD_AXIS_Z))
@@ -91,19 +137,27 @@ def masks(
         "chest": chest,
         "neck": smoothstep(*regions.neck_mm, up),
         "eyelids": own["eyelids"],
+        "rings": sum(_ring(p, ball.centre, regions) for ball in anatomy.eyes),
+        "rims": own["ears"]
+        * np.maximum(_rim(p, mark["ear_l"], regions), _rim(p, mark["ear_r"], regions)),
+        "knuckle": blob(
+            nose + [0.0, regions.knuckle_place_mm[0], -regions.knuckle_place_mm[1]],
+            regions.knuckle_mm,
+        ),
     }
 
     def over(weights):
         return sum(weight * places[name] for name, weight in weights.items())
 
     flush, pores, oil = over(regions.flush), over(regions.pores), over(regions.oil)
+    thin = np.maximum(over(regions.thin), 0)
     for name, share in regions.smooth.items():
         pores *= 1 - share * places[name]
     columns = {
-        "lips": own["lips"],
+        "lips": _lips(p, own),
         "flush": flush,
         "hair": hair,
-        "eyelid": own["eyelids"],
+        "eyelid": thin,
         "pores": pores,
         "oil": oil,
         "beard": beard,

@@ -18,7 +18,7 @@ from renderer.scene import (
     shapes,
 )
 from renderer.scene.graph import SceneGraph
-from renderer.scene.material import MAPS, Skin
+from renderer.scene.material import MAPS, PERSON, Skin
 from stimuli.errors import InputError
 from stimuli.heads import load_person, load_scan
 from stimuli.scenes import MM, Stage
@@ -80,9 +80,35 @@ def _dressed(model: Model) -> Model:
         everywhere = np.array([[material.masks.get(name, 0.0) for name in MASKS]], np.float32)
         surface = replace(surface, masks=np.repeat(everywhere, len(surface.masks), axis=0))
         proxy = replace(proxy, masks=np.repeat(everywhere, len(proxy.positions), axis=0))
+    if isinstance(material, Skin) and material.medium == PERSON:
+        medium = material.own_medium(*_face(surface.masks, surface, model.landmarks))
+        model = replace(model, material=replace(material, medium=medium))
     if "albedo_map" in own:
         proxy = replace(proxy, albedo=_mean_albedo(own["albedo_map"], surface))
     return replace(model, surface=replace(surface, proxy=proxy))
+
+
+#: How far from the middle between the eyes, and below it, a face reaches, mm.
+FACE_MM, FACE_BELOW_MM = 95.0, 35.0
+
+
+def _face(masks: np.ndarray, surface: Surface, marks: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (N, 8) and areas (N,) of a head's face, or of all of a surface that is no head.
+
+    Hair and the mouth's inside do not count: it is the skin's colour that is meant.
+    """
+    corners = surface.positions[surface.faces].astype(float)
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    share = np.bincount(surface.faces.ravel(), np.repeat(area / 6, 3), len(masks))
+    if "eyes" in marks:
+        middle = marks["eyes"] - [0.0, FACE_BELOW_MM, 0.0]
+        near = np.linalg.norm(surface.positions - middle, axis=1) < FACE_MM
+        share = share * (near & (surface.normals[:, 2] > 0))
+        for name in ("hair", "beard", "inside"):
+            share = share * (1 - masks[:, MASKS.index(name)])
+    return masks, share
 
 
 def _image(file: str, name: str) -> np.ndarray:

@@ -56,13 +56,13 @@ def test_an_albedo_map_is_shown_and_skin_lies_over_it_as_far_as_it_says(maps):
         albedo_map=maps["albedo"],
         map_layers=["freckles"],
         masks=masks,
-        freckles=2.0,
+        freckles=0.5,
         freckle_share=1.0,
     )
     assert freckled[2].min() < 0.7 * GREY and np.isclose(freckled[2], GREY, rtol=2e-3).mean() > 0.5
     np.testing.assert_allclose(freckled[0], 2.0, rtol=1e-3)
     rough = shaded(albedo_map=maps["albedo"], map_layers=["relief"], masks=masks)
-    assert rough[0].std() > 5e-4 and 0.8 * GREY < rough[2].min() < 0.99 * GREY  # pores are darker
+    assert rough[0].std() > 5e-4 and 0.75 * GREY < rough[2].min() < 0.99 * GREY  # pores are darker
     np.testing.assert_array_less(rough[2], GREY * 1.002)
 
 

@@ -41,9 +41,9 @@ def test_patches_replace_merge_and_remove():
 
 
 def test_a_persons_skin_is_the_start_and_the_scene_goes_over_it():
-    dark = {"objects": {"head": {"person": "man_dark"}}, "materials": {"head": {"melanin": 1.0}}}
+    dark = {"objects": {"head": {"person": "man_dark"}}, "materials": {"head": {"melanin": 0.3}}}
     skin = scenes.read_scene(scenes.merge(THESIS, dark)).materials["head"]
-    assert skin.melanin == 1.0 and skin.melanin_absorbance == (0.93, 1.06, 1.16)
+    assert skin.melanin == 0.3 and skin.epidermis_mm == 0.10
 
 
 def test_cameras_by_name_and_by_number():

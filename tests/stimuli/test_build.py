@@ -174,11 +174,11 @@ def test_a_scene_is_put_up_once_for_all_its_cameras(write_toml, fake_renderer, o
         '[[factors.levels]]\nname = "pale"\nlabel = "Pale"\n'
         "set = { materials = { head = { melanin = 0.1 } } }\n"
         '[[factors.levels]]\nname = "dark"\nlabel = "Dark"\n'
-        "set = { materials = { head = { melanin = 2.0 } }, picture = { exposure = 1.2 } }\n"
+        "set = { materials = { head = { melanin = 0.2 } }, picture = { exposure = 1.2 } }\n"
     )
     study = load_study(write_toml(write_toml().read_text() + people))
     assert build(study, out) == built(8, 0)
-    assert [scene.materials["head"].melanin for scene in fake_renderer.scenes] == [0.1, 2.0]
+    assert [scene.materials["head"].melanin for scene in fake_renderer.scenes] == [0.1, 0.2]
     assert fake_renderer.frames == ["near", "far"] * 2
     images = load_manifest(out).images
     assert images[0].levels == {"framing": "near", "skin": "pale"}
