@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy import sparse
 
-from stimuli.heads import mpfb, subdivide
+from stimuli.heads import mouth, mpfb, relief, subdivide
 from stimuli.heads.person import Person
 
 LEVELS = 2
 CROP_BELOW_CROWN_MM = 520.0
+EYES = ("helper-l-eye", "helper-r-eye")
 
 
 @dataclass(frozen=True)
@@ -22,15 +24,15 @@ class Bust:
     """The morphed bust at one subdivision level, millimetres; crown at y = 0, x and z centred on
     the head.
 
-    positions (N, 3); normals (N, 3); quads (F, 4); uvs (T, 2); uv_quads (F, 4); masks name -> (N,)
+    positions (N, 3); normals (N, 3); faces (F, 3); uvs (T, 2); uv_faces (F, 3); masks name -> (N,)
     in [0, 1].
     """
 
     positions: np.ndarray
     normals: np.ndarray
-    quads: np.ndarray
+    faces: np.ndarray
     uvs: np.ndarray
-    uv_quads: np.ndarray
+    uv_faces: np.ndarray
     masks: dict[str, np.ndarray]
 
 
@@ -44,22 +46,27 @@ class Eyeball:
 
 @dataclass(frozen=True)
 class Anatomy:
-    """What the generators of skin, hair and eyes need: busts per level (coarse to fine), eyes, lash
-    curves.
+    """What the generators of skin, hair and eyes need: the fine bust, a coarse one of some of its
+    vertices, eyes, lash curves.
+
+    fine has a third level of subdivision where the form wants it. curves: the folds and rises of
+    the form, on the skin before they moved it.
     """
 
-    levels: list[Bust]
-    to_fine: object  # sparse (N_fine, N_coarse): from levels[1] to levels[-1]
+    fine: Bust
+    coarse: Bust
+    to_fine: object  # sparse (N_fine, N_coarse)
     eyes: tuple[Eyeball, Eyeball]  # left of the person (x > 0), right
     landmarks: dict[str, np.ndarray]
     lashes: dict[str, np.ndarray]  # helper name -> (K, 3) points
+    curves: list[relief.Curve]
 
 
 def _sample_masks(
     images: dict[str, np.ndarray],
     uvs: np.ndarray,
-    uv_quads: np.ndarray,
-    quads: np.ndarray,
+    uv_faces: np.ndarray,
+    faces: np.ndarray,
     count: int,
 ) -> dict[str, np.ndarray]:
     """The masks sampled (bilinear) at every vertex: name -> (count,) in [0, 1]."""
@@ -72,47 +79,113 @@ def _sample_masks(
             image, [(1 - uvs[:, 1]) * h - 0.5, uvs[:, 0] * w - 0.5], order=1, mode="nearest"
         )
         mask = np.zeros(count)
-        mask[quads.ravel()] = at[uv_quads.ravel()]
+        mask[faces.ravel()] = at[uv_faces.ravel()]
         masks[name] = mask
     return masks
 
 
 def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
-    """Morph, pose, crop and subdivide the base mesh."""
+    """Morph, pose, crop and subdivide the base mesh, and give it the person's form.
+
+    levels: of subdivision everywhere, 1 or more; from 2 on one more where the form is narrow.
+    """
     base = mpfb.read_base(data)
+    plain = mpfb.lower_arms(data, base, base.positions, person.arm_drop_deg) * mpfb.MM_PER_UNIT
     shaped = mpfb.morph(data, base.positions, person.targets)
     shaped = mpfb.lower_arms(data, base, shaped, person.arm_drop_deg) * mpfb.MM_PER_UNIT
 
+    plain_eyes = [_ball(plain, base, name) for name in EYES]
+    eyes = [_ball(shaped, base, name) for name in EYES]
     crown = shaped[base.quads.ravel(), 1].max()
-    eyes, eye_vertices = [], ("helper-l-eye", "helper-r-eye")
-    for name in eye_vertices:
-        points = shaped[base.groups[name]]
-        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        eyes.append((centre, 0.5 * np.ptp(points[:, 0])))
-    origin = np.array([0.5 * (eyes[0][0][0] + eyes[1][0][0]), crown, 0.0])
+    origin = np.array([0.5 * (eyes[0].centre[0] + eyes[1].centre[0]), crown, 0.0])
     shaped = shaped - origin
+    balls = tuple(Eyeball(ball.centre - origin, ball.radius) for ball in eyes)
 
     keep = (shaped[base.quads, 1] > -CROP_BELOW_CROWN_MM).any(axis=1)
     used, quads = np.unique(base.quads[keep], return_inverse=True)
     uv_used, uv_quads = np.unique(base.uv_quads[keep], return_inverse=True)
     quads, uv_quads = quads.reshape(-1, 4), uv_quads.reshape(-1, 4)
-    points, uvs = shaped[used], base.uvs[uv_used]
+    # the person and the mesh without targets side by side: (V, 6)
+    both, uvs = np.hstack([shaped[used], plain[used]]), base.uvs[uv_used]
+    images = mpfb.mask_images(data)
+    for _ in range(levels):
+        smooth, new_quads = subdivide.catmull_clark(quads, len(both))
+        split, new_uv_quads = subdivide.bilinear(uv_quads, len(uvs))
+        before, count = quads, len(both)
+        both, uvs, quads, uv_quads = smooth @ both, split @ uvs, new_quads, new_uv_quads
 
-    busts, to_fine, images = [], None, mpfb.mask_images(data)
-    for level in range(levels + 1):
-        if level:
-            smooth, new_quads = subdivide.catmull_clark(quads, len(points))
-            split, new_uv_quads = subdivide.bilinear(uv_quads, len(uvs))
-            points, uvs, quads, uv_quads = smooth @ points, split @ uvs, new_quads, new_uv_quads
-            if level > 1:
-                to_fine = smooth if to_fine is None else smooth @ to_fine
-        normals = subdivide.vertex_normals(points, subdivide.triangles(quads))
-        masks = _sample_masks(images, uvs, uv_quads, quads, len(points))
-        busts.append(Bust(points, normals, quads, uvs, uv_quads, masks))
+    middle = 0.5 * (plain_eyes[0].centre + plain_eyes[1].centre)
+    points = both[:, :3]
+    normals = subdivide.vertex_normals(points, subdivide.triangles(quads))
+    reference = relief.Reference(both[:, 3:], quads, middle, points, normals)
+    made = relief.curves(person.form, reference)
+    masks = _sample_masks(images, uvs, uv_quads, quads, len(points))
+    close = relief.narrow(made, points) | ((masks["lips"] > 0.05) & (masks["inside-mouth"] < 0.9))
+    close &= levels > 1
+
+    # a level more where that is wanted; light is baked a level below
+    fine_map, uv_map, faces, uv_faces, _ = subdivide.refined(
+        quads, uv_quads, len(points), len(uvs), close[quads].any(axis=1)
+    )
+    both, uvs = fine_map @ both, uv_map @ uvs
+    points = both[:, :3]
+    masks = _sample_masks(images, uvs, uv_faces, faces, len(points))
+    normals = subdivide.vertex_normals(points, faces)
+    if person.form.lips_mm:
+        plain_normals = subdivide.vertex_normals(both[:, 3:], faces)
+        upper = mouth.above(both[:, 3:], plain_normals, masks["lips"])
+        points = points + mouth.closed(
+            points, normals, faces, masks["lips"], upper, person.form.lips_mm
+        )
+    normals = subdivide.vertex_normals(points, faces)
+    moved = relief.offsets(made, points, normals)
+    form = person.form
+    moved += mouth.ridge(
+        points, normals, faces, masks["lips"], form.lip_ridge_mm, form.lip_ridge_width_mm
+    )
+    points = points + moved
+    normals = subdivide.vertex_normals(points, faces)
+    fine = Bust(points, normals, faces, uvs, uv_faces, masks)
 
     lashes = {name: shaped[index] for name, index in base.groups.items() if "eyelashes" in name}
-    balls = tuple(Eyeball(centre - origin, float(radius)) for centre, radius in eyes)
-    return Anatomy(busts, to_fine, balls, _landmarks(busts[-1], balls), lashes)
+    coarse, to_fine = _coarse(fine, before, smooth, fine_map, close, count)
+    return Anatomy(fine, coarse, to_fine, balls, _landmarks(fine, balls), lashes, made)
+
+
+def _coarse(fine: Bust, quads, smooth, fine_map, close, count: int) -> tuple[Bust, object]:
+    """The mesh that light is baked on: the level below the last of those that are whole, with some
+    of the last one's vertices where the form is narrow; and the map from it to the fine one.
+
+    quads: of that level; smooth: its map to the next; close: the next one's vertices that are kept;
+    count: of its vertices. All its vertices are the fine mesh's too, in their places there.
+    """
+    wanted = close[:count][quads].any(axis=1)
+    _, _, faces, _, kept = subdivide.refined(quads, quads, count, count, wanted)
+    column = np.full(smooth.shape[0], -1)
+    column[kept] = np.arange(len(kept))
+    # what is not kept lies between the level's own vertices, which come first
+    is_kept = column >= 0
+    choose = sparse.csr_matrix(
+        (np.ones(len(kept)), (kept, np.arange(len(kept)))), (smooth.shape[0], len(kept))
+    )
+    widened = sparse.csr_matrix(
+        (smooth.data, smooth.indices, smooth.indptr), (smooth.shape[0], len(kept))
+    )
+    to_last = choose + sparse.diags((~is_kept).astype(float)) @ widened
+    bust = Bust(
+        fine.positions[kept],
+        fine.normals[kept],
+        faces,
+        np.zeros((0, 2)),
+        np.zeros((0, 3), int),
+        {name: mask[kept] for name, mask in fine.masks.items()},
+    )
+    return bust, (fine_map @ to_last).tocsr()
+
+
+def _ball(points: np.ndarray, base: mpfb.Base, name: str) -> Eyeball:
+    own = points[base.groups[name]]
+    return Eyeball(0.5 * (own.min(axis=0) + own.max(axis=0)), float(0.5 * np.ptp(own[:, 0])))
 
 
 def _landmarks(bust: Bust, eyes) -> dict[str, np.ndarray]:

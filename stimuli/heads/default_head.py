@@ -10,14 +10,13 @@ from renderer.scene.material import Skin
 from stimuli.heads import eyes, hair, skin
 from stimuli.heads.anatomy import Anatomy, Bust
 from stimuli.heads.person import Person
-from stimuli.heads.subdivide import triangles
 
 
 def _split(bust: Bust) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices split along UV seams: index of the position (N,), of the uv (N,), and triangles (M,
     3) into them.
     """
-    pairs = np.stack([triangles(bust.quads).ravel(), triangles(bust.uv_quads).ravel()], axis=1)
+    pairs = np.stack([bust.faces.ravel(), bust.uv_faces.ravel()], axis=1)
     unique, index = np.unique(pairs, axis=0, return_inverse=True)
     return unique[:, 0], unique[:, 1], index.reshape(-1, 3)
 
@@ -29,18 +28,17 @@ def default_model(
     person = person or Person()
     lines = {"hairline_mm": person.hair.hairline_mm, "regions": person.regions}
     own = Skin.read(person.skin, "person.skin")
-    fine, coarse = anatomy.levels[-1], anatomy.levels[1]
+    fine, coarse = anatomy.fine, anatomy.coarse
     mask = skin.masks(anatomy, fine, **lines)
     where, uv, faces = _split(fine)
     coarse_mask = skin.masks(anatomy, coarse, **lines)
-    proxy_faces = triangles(coarse.quads)
     pick = sparse.csr_matrix(
         (np.ones(len(where)), (np.arange(len(where)), where)), (len(where), len(fine.positions))
     )
     proxy = Proxy(
         coarse.positions,
         coarse.normals,
-        proxy_faces,
+        coarse.faces,
         own.mean_albedo(coarse_mask),
         (pick @ anatomy.to_fine).tocsr(),
         coarse_mask,

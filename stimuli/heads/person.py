@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from renderer.parameters import Parameters, parameter, refuse_unknown, weights
+from stimuli.heads.form import Form
 from stimuli.heads.regions import Regions
 
 _COLOUR = {"unit": "linear albedo", "low": 0.0, "high": 1.0}
@@ -65,6 +66,7 @@ class Person(Parameters):
     called: ClassVar[str] = "person"
 
     targets: dict[str, float] = field(default_factory=dict)
+    form: Form = field(default_factory=Form)
     arm_drop_deg: float = parameter(32.0, unit="degrees", low=0.0, high=80.0, source="by eye")
     eyes: Eyes = field(default_factory=Eyes)
     hair: Hair = field(default_factory=Hair)
@@ -78,6 +80,7 @@ class Person(Parameters):
         arm = super().read({k: v for k, v in table.items() if k == "arm_drop_deg"}, where)
         return cls(
             targets,
+            Form.read(table.get("form", {}), f"{where}.form"),
             arm.arm_drop_deg,
             Eyes.read(table.get("eyes", {}), f"{where}.eyes"),
             Hair.read(table.get("hair", {}), f"{where}.hair"),

@@ -7,6 +7,8 @@ follows the geometry by a product with it.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from scipy import sparse
 
@@ -14,8 +16,10 @@ from scipy import sparse
 def _edges(quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unique undirected edges (E, 2) of quads (F, 4), and the edge of each quad side (F, 4)."""
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges, of_side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
-    return edges, of_side.reshape(-1, 4)
+    low, high = sides.min(axis=1).astype(np.int64), sides.max(axis=1)
+    count = int(high.max()) + 1
+    keys, of_side = np.unique(low * count + high, return_inverse=True)
+    return np.stack(np.divmod(keys, count), axis=1), of_side.reshape(-1, 4)
 
 
 def _children(quads: np.ndarray, of_side: np.ndarray, vertices: int, edges: int) -> np.ndarray:
@@ -105,3 +109,55 @@ def vertex_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
         axis=1,
     )
     return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-20)
+
+
+def refined(
+    quads: np.ndarray, uv_quads: np.ndarray, vertices: int, uvs: int, chosen: np.ndarray
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix, np.ndarray, np.ndarray, np.ndarray]:
+    """One Catmull-Clark level of the chosen quads (F,) bool alone; the others become triangles that
+    meet them without gaps.
+
+    All old vertices stay, first and in their order, where the level moves them to. Returns: the
+    rows of `catmull_clark`'s map that are kept (V', V); those of `bilinear`'s for the texture
+    coordinates; triangles (M, 3) into each; and which of all rows of the level are kept (V',).
+    """
+    _, of_side = _edges(quads)
+    split = np.zeros(of_side.max() + 1, bool)
+    split[of_side[chosen]] = True
+    sides = split[of_side]  # (F, 4): which sides of a quad get a middle
+    whole, _ = catmull_clark(quads, vertices)
+    even, _ = bilinear(uv_quads, uvs)
+    faces, kept = _fitted(quads, of_side, sides, chosen, vertices)
+    _, of_uv_side = _edges(uv_quads)
+    uv_faces, uv_kept = _fitted(uv_quads, of_uv_side, sides, chosen, uvs)
+    return whole[kept], even[uv_kept], faces, uv_faces, kept
+
+
+def _fitted(
+    quads: np.ndarray, of_side: np.ndarray, sides: np.ndarray, chosen: np.ndarray, vertices: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (M, 3) of partly split quads, and the rows of a level that they use."""
+    edges = of_side.max() + 1
+    corner, middle = quads, vertices + of_side
+    face = vertices + edges + np.arange(len(quads))
+    parts = []
+    for k in range(4):
+        child = [corner[:, k], middle[:, k], face, middle[:, k - 1]]
+        parts.append(triangles(np.stack(child, axis=1)[chosen]))
+    pattern = sides @ (1 << np.arange(4))
+    for bits in range(16):
+        those = ~chosen & (pattern == bits)
+        outline = []
+        for k in range(4):
+            outline.append(corner[those, k])
+            if bits >> k & 1:
+                outline.append(middle[those, k])
+        # a fan from a middle has no triangle along one side: the first comes after its corner and
+        # those before
+        first = next((k for k in range(4) if bits >> k & 1), -1)
+        ring = outline[first + 1 :] + outline[: first + 1]
+        parts += [np.stack([ring[0], a, b], axis=1) for a, b in itertools.pairwise(ring[1:])]
+    faces = np.concatenate(parts)
+    used = np.zeros(vertices + edges + len(quads), bool)
+    used[:vertices] = used[faces] = True
+    return (np.cumsum(used) - 1)[faces], np.flatnonzero(used)

@@ -65,8 +65,8 @@ def make(data: Path) -> dict[str, np.ndarray]:
     import trimesh
 
     from stimuli.heads import anatomy, skin
+    from stimuli.heads.form import Form
     from stimuli.heads.person import Person
-    from stimuli.heads.subdivide import triangles
 
     targets = {}
     for sex in ("female", "male"):
@@ -74,11 +74,11 @@ def make(data: Path) -> dict[str, np.ndarray]:
             targets[f"macrodetails/{region}-{sex}-young"] = 1 / 6
         body = f"macrodetails/universal-{sex}-young-averagemuscle-averageweight"
         targets[body] = 0.5
-    made = anatomy.build_anatomy(data, Person(targets), 1)
-    bust, marks = made.levels[0], dict(made.landmarks)
+    made = anatomy.build_anatomy(data, Person(targets, Form.none()), 1)
+    bust, marks = made.coarse, dict(made.landmarks)
     marks |= {"eye_l": made.eyes[0].centre, "eye_r": made.eyes[1].centre}
     marks["crown"] = bust.positions[bust.positions[:, 1].argmax()]
-    faces, points, normals = triangles(bust.quads), bust.positions, bust.normals
+    faces, points, normals = bust.faces, bust.positions, bust.normals
 
     # what is seen from outside: rays over the half-space above each vertex
     solid = trimesh.Trimesh(points, faces, process=False)

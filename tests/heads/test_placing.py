@@ -35,9 +35,9 @@ def heads():
     made = {}
     for name in ("woman", "man_dark"):
         built = anatomy.build_anatomy(fetch.mpfb_data(), person(name), 1)
-        bust, balls = built.levels[0], built.eyes
+        bust, balls = built.coarse, built.eyes
         marks = {**built.landmarks, "eye_l": balls[0].centre, "eye_r": balls[1].centre}
-        made[name] = bust.positions, triangles(bust.quads), marks
+        made[name] = bust.positions, bust.faces, marks
     return made
 
 

@@ -14,7 +14,7 @@ from stimuli.heads.regions import Regions
 @pytest.fixture(scope="module")
 def bust():
     anatomy = anatomies.build_anatomy(fetch.mpfb_data(), Person(), levels=1)
-    return anatomy, anatomy.levels[-1]
+    return anatomy, anatomy.fine
 
 
 def column(bust, name, **table):

@@ -1,0 +1,115 @@
+"""The form of a person: folds as deep as they are said to be, lips that meet, two like sides."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from renderer.errors import InputError
+from stimuli.heads import anatomy as anatomies
+from stimuli.heads import fetch, mouth, subdivide
+from stimuli.heads.form import PLACES, Form
+from stimuli.heads.person import Person
+
+FOLD = {"height_mm": -1.5, "width_mm": 2.2, "bulge_mm": 0.0}
+
+
+def build(form: Form, levels: int = 2):
+    return anatomies.build_anatomy(fetch.mpfb_data(), Person(form=form), levels)
+
+
+@pytest.fixture(scope="module")
+def folded():
+    """One fold alone, on both sides, and closed lips."""
+    even = {"folds": 0.0, "bones": 0.0, "asymmetry": 0.0, "wander_mm": 0.0}
+    return build(Form(**even, relief={"nasolabial": FOLD}))
+
+
+def first(bust, origins, towards):
+    """How far the rays go until they meet the skin (N,)."""
+    mesh = trimesh.Trimesh(bust.positions, bust.faces, process=False, validate=False)
+    rays = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh)
+    place, ray, _ = rays.intersects_location(origins, towards, multiple_hits=False)
+    distance = np.full(len(origins), np.inf)
+    distance[ray] = np.linalg.norm(place - origins[ray], axis=1)
+    return distance
+
+
+def test_a_fold_is_as_deep_and_as_wide_as_its_field(folded):
+    for curve in (c for c in folded.curves if c.name == "nasolabial"):
+        middle = (curve.along > 0.35) & (curve.along < 0.45)
+        points, normals = curve.points[middle], curve.normals[middle]
+        across = np.cross(normals, curve.tangents[middle])
+        depth = lambda at: first(folded.fine, at + 5 * normals, -normals) - 5  # noqa: B023
+        np.testing.assert_allclose(depth(points), 1.5, atol=0.12)
+        # the skin is curved: what lies on both sides is its mean
+        wide = FOLD["width_mm"]
+        aside = 0.5 * (depth(points + wide * across) + depth(points - wide * across))
+        far = 0.5 * (depth(points + 3 * wide * across) + depth(points - 3 * wide * across))
+        np.testing.assert_allclose(aside - far / 9, 1.5 / np.e, atol=0.2)
+
+
+def test_closed_lips_lie_over_each_other(folded):
+    bust = folded.fine
+    x, upper, lower = mouth.seam(bust.positions, bust.normals, bust.masks["lips"])
+    inner = np.abs(x - x.mean()) < 0.85 * np.abs(x - x.mean()).max()
+    assert (lower - upper)[inner].min() > 0.2
+    gap = np.column_stack([x, 0.5 * (lower + upper), np.full(len(x), 400.0)])[inner]
+    front = bust.positions[bust.masks["lips"] > 0.5][:, 2].max()
+    depth = 400 - first(bust, gap, np.tile([0.0, 0.0, -1.0], (len(gap), 1)))
+    assert depth.min() > front - 18  # a ray between the lips does not pass them
+
+
+def test_both_sides_are_alike_without_asymmetry(folded):
+    from scipy.spatial import cKDTree
+
+    p, lips = folded.fine.positions, folded.fine.masks["lips"]
+    face = (p[:, 2] > 60) & (p[:, 1] > -230)
+    apart, _ = cKDTree(p).query(p * [-1, 1, 1])
+    assert np.quantile(apart[face & (lips < 0.05)], 0.99) < 0.01
+    assert np.quantile(apart[face], 0.99) < 0.25  # the mask of the lips itself is not quite even
+
+
+def test_what_strays_is_drawn_from_the_seed():
+    one, same, other = (build(Form(seed=s, wander_mm=2.0), 1).fine.positions for s in (5, 5, 6))
+    np.testing.assert_array_equal(one, same)
+    assert np.abs(one - other).max() > 0.1
+
+
+def test_a_partly_split_mesh_has_no_gaps():
+    x, y = np.meshgrid(np.arange(5.0), np.arange(5.0))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(25)])
+    quads = np.array([[i, i + 1, i + 6, i + 5] for i in range(19) if i % 5 < 4])
+    for seed in range(8):
+        chosen = np.random.default_rng(seed).random(len(quads)) < 0.4
+        new, _, faces, uv_faces, _ = subdivide.refined(quads, quads, 25, 25, chosen)
+        mesh = trimesh.Trimesh(new @ points, faces, process=False)
+        np.testing.assert_array_equal(faces, uv_faces)
+        _, shared = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+        # a disc: a gap would be one more border
+        assert shared.max() == 2 and mesh.euler_number == 1
+        assert (mesh.face_normals[:, 2] > 0.99).all()
+
+
+def test_older_people_have_deeper_folds_and_the_same_bones():
+    young, old = Form(age_years=22), Form(age_years=70)
+    for name, place in PLACES.items():
+        a, b = abs(young.of(name).height_mm), abs(old.of(name).height_mm)
+        assert (a <= b) if place.fold else a == b
+    assert abs(old.of("nasolabial").height_mm) > 2 * abs(young.of("nasolabial").height_mm)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"age_years": 3}, "person.form.age_years is 3 years; expected 15.0 to 95.0"),
+        ({"relief": {"larinx": {}}}, "person.form.relief.larinx is unknown"),
+        ({"relief": {"larynx": {"height": 1}}}, "relief.larynx.height is unknown"),
+        ({"relief": {"larynx": {"height_mm": 90}}}, "larynx.height_mm is 90 mm; expected -15.0"),
+        ({"relief": {"larynx": 2}}, "person.form.relief.larynx is 2; expected a table"),
+        ({"weaker": "both"}, "expected one of 'left', 'right'"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(table, words):
+    with pytest.raises(InputError) as caught:
+        Person.read({"form": table}, "person")
+    assert words in str(caught.value) and "\n" not in str(caught.value)
