@@ -63,7 +63,7 @@ void main() {
         float focus = 1.0 + 0.9 * clamp(-dot(iris, across), -0.5, 1.0);
         float on_iris = max(dot(flat_n, l), 0.0) * focus, on_white = smoothstep(-0.25, 1.0, dot(n, l));
         irradiance += light_here * seen * mix(on_iris, on_white, limbus);
-        specular += light_here * seen * max(dot(n, l), 0.0) * min(kelemen(n, v, l, 0.045, f0), 40.0);
+        specular += seen * schlick(f0, max(dot(n, v), 0.02)) * lamp_mirrored(k, world, reflect(-v, n), 0.03);
     }
     vec3 r_dir = reflect(-v, n);
     float nv = max(dot(n, v), 0.02);

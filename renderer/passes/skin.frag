@@ -282,9 +282,9 @@ float sent_back_even() { return sent_back(face_even(lobes.x), face_even(lobes.y)
 float goes_in(vec3 n, vec3 v, vec3 l, float m) {
 #if DIFFUSE == DISNEY
     float lh = dot(l, normalize(l + v)), f90 = 0.5 + 2.0 * m * lh * lh;
-    return (1.0 + (f90 - 1.0) * pow(1.0 - dot(n, l), 5.0)) * (1.0 + (f90 - 1.0) * pow(1.0 - max(dot(n, v), 0.0), 5.0));
+    return (1.0 + (f90 - 1.0) * pow(1.0 - max(dot(n, l), 0.0), 5.0)) * (1.0 + (f90 - 1.0) * pow(1.0 - max(dot(n, v), 0.0), 5.0));
 #elif DIFFUSE == CONSERVING
-    return 1.0 - sent_back(dot(n, l));
+    return 1.0 - sent_back(max(dot(n, l), 0.0));
 #else
     return 1.0;
 #endif
@@ -376,18 +376,18 @@ void main() {
     float shown = (1.0 - 0.6 * shade) * (1.0 - 0.85 * b.w);
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world);
-        float nl = dot(n, l), geometric = dot(smooth_n, l);
+        float facing = lamp_facing(k, world, n), geometric = dot(smooth_n, l), below = -lamp_sine(k, world);
 #ifdef DIFFUSE_ONLY
-        float ml = 0.0;
+        float mirrors = 0.0;
 #else
-        float ml = dot(mirror, l);
+        float mirrors = lamp_facing(k, world, mirror);
 #endif
-        if (geometric > -0.08 && max(nl, ml) > 0.0) {
-            vec3 e = lamp_light(k, world) * visibility(k, world, smooth_n, phase) * smoothstep(-0.08, 0.12, geometric);
-            if (nl > 0.0) irradiance += e * nl * goes_in(n, v, l, m);
+        if (geometric > below - 0.08 && max(facing, mirrors) > 0.0) {
+            vec3 e = lamp_light(k, world) * visibility(k, world, smooth_n, phase) * smoothstep(below - 0.08, below + 0.12, geometric);
+            if (facing > 0.0) irradiance += e * facing * goes_in(n, v, l, m);
 #ifndef DIFFUSE_ONLY
             vec2 wide = sqrt(lobes * lobes + lamp_spread(k, world));
-            if (ml > 0.0) specular += e * ml * shown * mix(kelemen(mirror, v, l, wide.x, normal_f0), kelemen(mirror, v, l, wide.y, normal_f0), second);
+            if (mirrors > 0.0) specular += e * mirrors * shown * mix(kelemen(mirror, v, l, wide.x, normal_f0), kelemen(mirror, v, l, wide.y, normal_f0), second);
 #endif
         }
     }

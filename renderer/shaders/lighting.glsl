@@ -32,6 +32,26 @@ vec3 lamp_light(int lamp, vec3 p) {
     return lamp_irradiance[lamp] * falloff * (lamp_cone[lamp].w < -1.5 ? 1.0 : t * t);
 }
 
+// Sine of the angle that half of a lamp takes up, seen from p: a disc that faces p.
+float lamp_sine(int lamp, vec3 p) {
+    float size = lamp_size[lamp], d = distant(lamp) ? 1.0 : length(lamp_place[lamp].xyz - p);
+    return min(size * inversesqrt(size * size + d * d), 0.999);
+}
+// Irradiance on a surface with normal n over that on one that faces the lamp: the cosine, and where the horizon cuts the disc, the
+// exact integral over what is left of it (Lagarde and de Rousiers 2014, "Moving Frostbite to PBR", listing 10).
+float lamp_facing(int lamp, vec3 p, vec3 n) {
+    float c = clamp(dot(n, lamp_towards(lamp, p)), -1.0, 1.0), s = lamp_sine(lamp, p);
+    if (c * c >= s * s || s < 1e-3) return max(c, 0.0);
+    float x = sqrt(1.0 / (s * s) - 1.0), sine = sqrt(1.0 - c * c), y = clamp(-x * c / sine, -1.0, 1.0), root = sine * sqrt(1.0 - y * y);
+    return max(((c * acos(y) - x * root) + atan(root / x) / (s * s)) / PI, 0.0);
+}
+// Radiance of a lamp in a mirror direction r, edges blurred over `blur` radians: what a smooth wet surface shows.
+vec3 lamp_mirrored(int lamp, vec3 p, vec3 r, float blur) {
+    float s = lamp_sine(lamp, p), radius = asin(s);
+    float away = acos(clamp(dot(r, lamp_towards(lamp, p)), -1.0, 1.0));
+    return lamp_light(lamp, p) * (1.0 - smoothstep(radius - blur, radius + blur, away)) / (PI * (s * s + 0.18 * blur * blur));
+}
+
 float layer_depth(int layer, vec2 at) { return texture(solid_depth, vec3(at, float(layer))).r * depth_range; }
 float layer_strands(int layer, vec2 at) { return texture(strand_depth, vec3(at, float(layer))).r * depth_range; }
 // The layer that sees p: the only one, or the cube's face (+x, -x, +y, -y, +z, -z).
@@ -58,12 +78,19 @@ float visibility(int lamp, vec3 p, vec3 n, float phase) {
     int layer = layer_of(lamp, inner);
     vec3 q = to_layer(layer, inner);
     float scale = scale_of(lamp, layer, q.z), size = lamp_size[lamp];
+    // The surface's own plane in the map, mm of depth a mm across (Isidoro 2006, "Shadow mapping: GPU-based tips and techniques"):
+    // what lies on it does not shade it.
+    mat4 map = layer_matrix[layer];
+    vec3 right = normalize(vec3(map[0][0], map[1][0], map[2][0])), over = normalize(vec3(map[0][1], map[1][1], map[2][1]));
+    float facing = max(-dot(n, vec3(map[0][2], map[1][2], map[2][2])), 0.2);
+    vec2 rise = vec2(dot(n, right), dot(n, over)) / facing;
     float reach = distant(lamp) ? size : size / max(q.z - lamp_search[lamp], 0.1 * q.z);
     float search = lamp_search[lamp] * reach * scale;
     float sum = 0.0, count = 0.0;
     for (int k = 0; k < 12; ++k) {
-        float z = layer_depth(layer, q.xy + search * vogel(k, 12, phase));
-        if (z < q.z - 0.6) { sum += z; count += 1.0; }
+        vec2 o = search * vogel(k, 12, phase);
+        float z = layer_depth(layer, q.xy + o);
+        if (z < q.z + dot(rise, o) / scale - 0.6 - 0.1 * length(o) / scale) { sum += z; count += 1.0; }
     }
     float lit = 1.0;
     if (count > 0.0) {
@@ -73,7 +100,7 @@ float visibility(int lamp, vec3 p, vec3 n, float phase) {
         lit = 0.0;
         for (int k = 0; k < 24; ++k) {
             vec2 o = penumbra * vogel(k, 24, phase + 1.7);
-            lit += layer_depth(layer, q.xy + o) < q.z - 0.25 - 0.9 * length(o) / scale ? 0.0 : 1.0;
+            lit += layer_depth(layer, q.xy + o) < q.z + dot(rise, o) / scale - 0.25 - 0.1 * length(o) / scale ? 0.0 : 1.0;
         }
         lit /= 24.0;
     }
@@ -86,10 +113,10 @@ float visibility(int lamp, vec3 p, vec3 n, float phase) {
     return lit * through / 12.0;
 }
 
-// What a lamp's size adds to the squared Beckmann slope of a mirror that shows it: a disc of the tangent t is t/2 of slopes of the half
+// What a lamp's size adds to the squared Beckmann slope of a mirror that shows it: a disc of the sine t is t/2 of slopes of the half
 // vector, whose variance is t^2/16 along each axis.
 float lamp_spread(int lamp, vec3 p) {
-    float t = distant(lamp) ? lamp_size[lamp] : lamp_size[lamp] / max(length(lamp_place[lamp].xyz - p), 1.0);
+    float t = lamp_sine(lamp, p);
     return 0.125 * t * t;
 }
 

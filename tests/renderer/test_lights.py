@@ -128,6 +128,40 @@ def test_lamps_give_the_irradiance_of_their_law(light, expected):
     assert got == pytest.approx(expected, rel=4e-3, abs=1e-6)
 
 
+@pytest.mark.parametrize("radius_deg", [2.0, 8.0, 20.0])
+def test_a_large_lamp_lights_past_the_middle_of_a_ball(radius_deg):
+    """The horizon cuts its disc, and the ball does not shade itself."""
+    light = DistantLight((2.0,) * 3, direction=(1.0, 0.0, 0.0), radius_deg=radius_deg)
+    made = {
+        "objects": {"ball": {"shape": "sphere", "radius_mm": 40.0}},
+        "materials": {"ball": {"medium": ""}},
+        "lights": {"lamp": light.plain()},
+        "camera": {
+            "framing": "ball",
+            "height_mm": 96.0,
+            "yaw_deg": 0.0,
+            "pitch_deg": 0.0,
+            "fov_y_deg": 0.5,  # nearly parallel: a pixel is a millimetre
+        },
+    }
+    staged = scenes.stage(scenes.read_scene(made))
+    with (
+        renderer.Renderer(staged.graph, (97, 97), 1, rays=8, shadow_map=1024) as drawing,
+        drawing.frame() as frame,
+    ):
+        irradiance = frame.surface.textures[0].read()[48, :, 0].copy()
+    x = np.arange(-36, 37) / 40 * 96 / 97
+    row = np.column_stack([x, np.zeros_like(x), np.sqrt(1 - x * x)])
+    got = irradiance[48 - 36 : 48 + 37]
+    # a disc of even radiance: its projection on a facing plane is even, the solid angle 1 / cosine
+    share, spin = np.meshgrid((np.arange(64) + 0.5) / 64, 2 * np.pi * np.arange(64) / 64)
+    y, z = (np.sin(np.radians(radius_deg)) * np.sqrt(share) * f(spin) for f in (np.cos, np.sin))
+    towards = np.column_stack([np.sqrt(1 - y * y - z * z).ravel(), y.ravel(), z.ravel()])
+    expected = 2 * (np.maximum(row @ towards.T, 0) / towards[:, 0]).mean(axis=1)
+    assert (expected[row[:, 0] < 0] > 0).any()
+    np.testing.assert_allclose(got, expected, atol=0.03)
+
+
 @pytest.mark.parametrize("shadow", [True, False])
 def test_a_lamp_among_the_objects_casts_shadows_all_around(shadow):
     """A lamp inside a room: walls are lit on all sides, and dark behind a ball."""
