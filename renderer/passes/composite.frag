@@ -3,7 +3,7 @@
 #include "shaders/screen.glsl"
 #include "shaders/environment.glsl"
 uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albedo; uniform sampler2D depths;
-uniform float exposure;
+uniform float exposure; uniform float saturation; uniform float power;
 uniform float conserving;  // 1: what the face sends back inside does not get out
 uniform float texturing;  // the power of the albedo that is in the scattered light already
 uniform int tone_map; uniform int backdrop;  // places in the lists of renderer/scene/picture.py
@@ -22,7 +22,35 @@ vec3 filmic(vec3 x) { return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.
 vec3 hable_curve(vec3 x) { return (x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.50) + 0.06) - 0.02 / 0.30; }
 vec3 hable(vec3 x) { return hable_curve(2.0 * x) / hable_curve(vec3(11.2)); }
 
-vec3 toned(vec3 x) { return tone_map == 0 ? filmic(x) : tone_map == 1 ? hable(x) : x; }
+// Sobotka's AgX; see renderer/scene/picture.py for the numbers and their sources.
+uniform mat3 agx_in; uniform mat3 agx_out; uniform mat3 from_rec2020; uniform vec2 agx_stops;
+vec3 agx(vec3 x) {
+    x = clamp((log2(max(agx_in * max(x, 0.0), 1e-10)) - agx_stops.x) / (agx_stops.y - agx_stops.x), 0.0, 1.0);
+    x = ((((((15.5 * x - 40.14) * x + 31.96) * x - 6.868) * x + 0.4298) * x + 0.1191) * x) - 0.00232;
+    return from_rec2020 * pow(max(agx_out * x, 0.0), vec3(2.2));
+}
+
+// Khronos 2024, "PBR Neutral tone mapper".
+vec3 neutral(vec3 x) {
+    const float start = 0.8 - 0.04;
+    float least = min(x.r, min(x.g, x.b));
+    x -= least < 0.08 ? least - 6.25 * least * least : 0.04;
+    float peak = max(x.r, max(x.g, x.b));
+    if (peak < start) return x;
+    float now = 1.0 - (1.0 - start) * (1.0 - start) / (peak + 1.0 - 2.0 * start);
+    float share = 1.0 / (0.15 * (peak - now) + 1.0);
+    return mix(vec3(now), x * now / peak, share);
+}
+
+vec3 toned(vec3 x) {
+    if (tone_map == 0) x = filmic(x);
+    else if (tone_map == 1) x = hable(x);
+    else if (tone_map == 3) x = agx(x);
+    else if (tone_map == 4) x = neutral(x);
+    x = clamp(x, 0.0, 1.0);
+    if (saturation != 1.0) x = clamp(mix(vec3(dot(x, vec3(0.2126, 0.7152, 0.0722))), x, saturation), 0.0, 1.0);
+    return power == 1.0 ? x : pow(x, vec3(power));
+}
 
 vec3 behind() {
     vec2 uv = image_pixel() / image_size;
@@ -49,5 +77,5 @@ void main() {
         radiance = (light.a > 0.5 ? left : own) * mix(1.0, face.a, conserving) * light.rgb / PI;
     }
     radiance = radiance * (1.0 - over.a) + over.rgb;
-    colour = vec4(clamp(toned(exposure * radiance), 0.0, 1.0), 1.0);
+    colour = vec4(toned(exposure * radiance), 1.0);
 }

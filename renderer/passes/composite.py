@@ -10,7 +10,7 @@ from renderer import gl
 from renderer.gl import GL
 from renderer.passes.environment import Surroundings
 from renderer.passes.pieces import Piece
-from renderer.scene.picture import BACKDROPS, TONE_MAPS, Picture
+from renderer.scene.picture import AGX, BACKDROPS, TONE_MAPS, Picture
 from renderer.scene.view import View
 
 
@@ -52,6 +52,9 @@ def composite(
         "conserving": float(conserving),
         "depths": depths,
         "exposure": picture.exposure,
+        "saturation": picture.saturation,
+        "power": picture.power,
+        **AGX,
         "tone_map": TONE_MAPS.index(picture.tone_map),
         "backdrop": BACKDROPS.index(picture.backdrop),
         "backdrop_centre": picture.centre,
@@ -72,6 +75,7 @@ def composite(
             programs("passes/resolve.frag").use(
                 colour_map=colour.textures[0],
                 factor=supersample,
+                grain=picture.grain,
                 first_row=piece.low // supersample,
             )
             gl.draw_fullscreen(context)

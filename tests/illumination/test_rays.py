@@ -142,8 +142,9 @@ def test_monte_carlo_gathers_an_emitting_square():
 def test_pictures_of_rays_are_developed_as_the_card_does(ball):
     graph = ball(model="phong", exponent=20.0)
     with renderer.Renderer(graph, (64, 48), 1, rays=4, shadow_map=64) as drawing:
-        for tone_map in TONE_MAPS:
-            own = Picture(exposure=1.2, tone_map=tone_map)
+        for k, tone_map in enumerate(TONE_MAPS):
+            graded = {"saturation": 1.3, "power": 0.9} if k % 2 else {}
+            own = Picture(exposure=1.2, tone_map=tone_map, **graded)
             with drawing.frame(picture=own) as frame:
                 seen, on = radiance(frame)
                 image = frame.render(renderer.make("none")).image

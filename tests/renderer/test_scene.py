@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+import renderer
 from renderer.errors import InputError as SceneError
 from renderer.scene import ANGLES, FRAMINGS, Material, Scene, Skin
+from renderer.scene.picture import TONE_MAPS, Picture
 from stimuli import scenes
 from stimuli.errors import InputError
 from stimuli.parts import LIGHTS, PEOPLE, SCENES, names
@@ -74,6 +76,39 @@ def test_framings_that_are_none_are_refused(wrong):
     table = {**THESIS, "framings": wrong, "camera": {"framing": "near"}}
     with pytest.raises((InputError, SceneError), match="framings|camera"):
         scenes.read_scene(table)
+
+
+@pytest.mark.parametrize("tone_map", TONE_MAPS)
+def test_tone_maps_keep_greys_grey_and_rise(tone_map):
+    steps = np.geomspace(1e-3, 20, 60)
+    grey = Picture(exposure=1.0, tone_map=tone_map).encode(np.repeat(steps[:, None], 3, axis=1))
+    assert (np.ptp(grey.astype(int), axis=1) <= 1).all()
+    assert (np.diff(grey[:, 1].astype(int)) >= 0).all() and grey[0, 1] < 10 and grey[-1, 1] > 240
+
+
+def test_grain_has_its_strength_and_no_mean():
+    made = {
+        "objects": {"ball": {"shape": "sphere", "radius_mm": 1.0}},
+        "materials": {"ball": {}},
+        "lights": {"lamp": {"irradiance": [0.0, 0.0, 0.0]}},
+        "camera": {"framing": "far", "height_mm": 900.0, "yaw_deg": 0.0},
+        "picture": {"centre": [0.4] * 3, "edge": [0.4] * 3},
+    }
+    pictures = []
+    for grain in (0.0, 0.03):
+        made["picture"]["grain"] = grain
+        staged = scenes.stage(scenes.read_scene(made))
+        with (
+            renderer.Renderer(staged.graph, (128, 128), 1, rays=4, shadow_map=64) as drawing,
+            drawing.frame() as frame,
+        ):
+            pictures.append(frame.render(renderer.make("none")).image.astype(float))
+    away = (pictures[1] - pictures[0])[:, :50]
+    level = pictures[0][64, 10, 1] / 255
+    assert away.std() == pytest.approx(
+        255 * 0.03 * np.sqrt(4 * level * (1 - level) + 0.05), rel=0.05
+    )
+    assert abs(away.mean()) < 0.3 and (np.ptp(away, axis=2) <= 1).all()
 
 
 def test_coatings_and_thickness_make_layers():
