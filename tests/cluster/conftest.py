@@ -10,7 +10,7 @@ SCENE = """
 shape = "slab"
 size_mm = [40.0, 20.0, 20.0]
 [materials.bar]
-medium = "green_jade"
+medium = "deon_luebke"
 [lights.lamp]
 kind = "point"
 position_mm = [-150.0, 130.0, 160.0]
@@ -46,13 +46,13 @@ set = { camera = { framing = "far", height_mm = 70.0, yaw_deg = 20.0 } }
 name = "medium"
 label = "Medium"
 [[factors.levels]]
-name = "jade"
-label = "Jade"
-set = { materials = { bar = { medium = "green_jade" } } }
+name = "skin"
+label = "Skin"
+set = { materials = { bar = { medium = "deon_luebke" } } }
 [[factors.levels]]
-name = "milk"
-label = "Milk"
-set = { materials = { bar = { medium = "wholemilk" } } }
+name = "dermis"
+label = "Dermis"
+set = { materials = { bar = { medium = "skin1" } } }
 [[techniques]]
 name = "none"
 label = "None"

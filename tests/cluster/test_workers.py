@@ -24,6 +24,7 @@ from renderer.optics import montecarlo
 from renderer.reference import estimate as estimates
 from renderer.reference.walk import Part, Solid
 from renderer.scene.shapes import slab
+from tests.cluster.tasks import die, die_once, threads
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Writes a file in each of two processes for ever; Ctrl-C ends it.
@@ -44,20 +45,11 @@ if __name__ == "__main__":
 """
 
 
-def threads(_):
-    return os.getpid(), [os.environ[name] for name in THREADS]
-
-
-def die_once(marker):
-    """Ends the process in the midst of the work, the first time."""
-    if not marker.exists():
-        marker.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return marker.name
-
-
-def die(_):
-    os._exit(1)
+@pytest.fixture(scope="module")
+def two():
+    """Two processes, for all tests in which nobody ends them."""
+    with crew(workers=2) as made:
+        yield made.executor
 
 
 def test_a_build_by_two_processes_is_that_of_one(run, study, here, contents, tmp_path):
@@ -72,7 +64,7 @@ def test_workers_share_the_cores_and_are_no_forks(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     with crew(workers=1) as made:
-        ((pid, shares),) = made.executor.map(threads, [0])
+        ((pid, shares),) = made.executor.map(threads, [THREADS])
     assert pid != os.getpid() and shares == [str(cores)] * len(THREADS)
 
 
@@ -130,26 +122,24 @@ def test_workers_end_when_they_are_to(tmp_path, who):
             time.sleep(0.05)
 
 
-def test_photons_by_two_processes_are_those_of_threads():
+def test_photons_by_two_processes_are_those_of_threads(two):
     """To the bit, wherever a batch is cut."""
     layers = [montecarlo.Layer(n=1.4, mu_a=1, mu_s=10, g=0.9, d=0.5)]
     alone = montecarlo.simulate(layers, 60_001, 3, cache=False, threads=1)
-    with crew(workers=2) as made:
-        shared = montecarlo.simulate(layers, 60_001, 3, cache=False, executor=made.executor)
+    shared = montecarlo.simulate(layers, 60_001, 3, cache=False, executor=two)
     assert shared.tally.sums.tobytes() == alone.tally.sums.tobytes()
 
 
-def test_power_by_two_processes_is_that_of_one():
+def test_power_by_two_processes_is_that_of_one(two):
     """Of studies in two parts, each with a seed of its own."""
     plan = Plan(("a", "b", "c"), ("a", "b"), studies=PART + 1, most=40)
     alone = plan_table(plan)
-    with crew(workers=2) as made:
-        shared = plan_table(plan, executor=made.executor)
+    shared = plan_table(plan, executor=two)
     for here, there in zip(alone, shared, strict=True):
         assert here.to_csv() == there.to_csv()
 
 
-def test_the_bootstrap_by_two_processes_is_that_of_one(tmp_path):
+def test_the_bootstrap_by_two_processes_is_that_of_one(two, tmp_path):
     """Of one technique that hardly ever loses too: a resample without a maximum."""
     rng = np.random.default_rng(4)
     rows = [
@@ -162,15 +152,14 @@ def test_the_bootstrap_by_two_processes_is_that_of_one(tmp_path):
     records = [dict(zip(columns, row)) for row in rows]
     options = Options(resamples=FITTED + 40)
     alone = everything(responses_from_records(records), options).tables
-    with crew(workers=2) as made:
-        responses = responses_from_records(records)
-        shared = everything(responses, options, executor=made.executor, folder=tmp_path).tables
+    responses = responses_from_records(records)
+    shared = everything(responses, options, executor=two, folder=tmp_path).tables
     assert alone.keys() == shared.keys() and not list(tmp_path.iterdir())
     for name, table in alone.items():
         assert table.to_csv() == shared[name].to_csv(), name
 
 
-def test_a_reference_by_two_processes_is_that_of_one(monkeypatch, tmp_path):
+def test_a_reference_by_two_processes_is_that_of_one(two, monkeypatch, tmp_path):
     """Of several blocks a step and several steps, and what is handed over is taken away."""
     monkeypatch.setenv("SUBDERMAL_CACHE", str(tmp_path))
     monkeypatch.setattr(estimates, "BLOCK", 700)
@@ -181,8 +170,7 @@ def test_a_reference_by_two_processes_is_that_of_one(monkeypatch, tmp_path):
     light = lambda triangle, weights: np.column_stack([weights[:, 0]] * 3) + triangle[:, None]
     rest = (points, normals, np.arange(500), light, 6, 1, False)
     alone = estimates.estimate(solid, estimates.walked("skin1"), *rest)
-    with crew(workers=2) as made:
-        shared = estimates.estimate(solid, estimates.walked("skin1"), *rest, made.executor)
+    shared = estimates.estimate(solid, estimates.walked("skin1"), *rest, two)
     assert shared.values.tobytes() == alone.values.tobytes() and alone.values.std() > 0
     assert not list((tmp_path / "reference").iterdir())
 

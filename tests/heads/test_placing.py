@@ -125,7 +125,7 @@ def test_bodies_and_children_have_their_heads_found(source):
         assert np.degrees(np.arccos(fit.forward @ turn("y", 140)[:, 2])) < 5
 
 
-def test_shapes_without_a_face_are_said_to_have_none(source):
+def test_shapes_without_a_face_are_said_to_have_none(source, monkeypatch):
     import trimesh
 
     ball = trimesh.creation.icosphere(3)
@@ -137,6 +137,9 @@ def test_shapes_without_a_face_are_said_to_have_none(source):
     }
     assert not register.fit(*map(np.asarray, shapes["box"])).found
     egg = shapes["egg"]
+    fitted = register.fit(*map(np.asarray, egg))
+    assert not fitted.found
+    monkeypatch.setattr(register, "fit", lambda *_: fitted)  # of one surface, found once
     placed = by_face(source, np.asarray(egg[0]), np.asarray(egg[1]), Asked(), False)
     assert placed.fit is None and placed.unit == "mm"
     assert any("no face was found" in note for note in source.notes)
