@@ -89,6 +89,17 @@ def _azimuth(bits):
 
 
 @numba.njit(**_INLINE)
+def henyey_greenstein(g, u):
+    """Cosine of the angle by which light turns, of mean g, from a uniform u: Henyey and Greenstein
+    1941, inverted.
+    """
+    if g == 0:
+        return 1 - 2 * u
+    t = (1 - g * g) / (1 - g + 2 * g * u)
+    return (1 + g * g - t * t) / (2 * g)
+
+
+@numba.njit(**_INLINE)
 def fresnel(n1, n2, cos1):
     """(reflectance of unpolarised light, cosine beyond the face); exact; 1 and 0 in total
     reflection.
@@ -179,12 +190,7 @@ def walk(
                     weight *= 1 / ROULETTE_CHANCE
                 order += 1
                 state, bits = _bits(state)
-                u = _uniform(bits)
-                if mean_cos == 0:
-                    cosine = 1 - 2 * u
-                else:  # Henyey-Greenstein, inverted
-                    t = (1 - mean_cos * mean_cos) / (1 - mean_cos + 2 * mean_cos * u)
-                    cosine = (1 + mean_cos * mean_cos - t * t) / (2 * mean_cos)
+                cosine = henyey_greenstein(mean_cos, _uniform(bits))
                 sine = math.sqrt(max(1 - cosine * cosine, 0.0))
                 state, bits = _bits(state)
                 c, s = _azimuth(bits)

@@ -18,7 +18,14 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from renderer.optics.medium import Medium
-from renderer.optics.walk import _azimuth, _bits, _exponential, _uniform, fresnel
+from renderer.optics.walk import (
+    _azimuth,
+    _bits,
+    _exponential,
+    _uniform,
+    fresnel,
+    henyey_greenstein,
+)
 
 FAR = np.float32(1e30)  # mm: a ray that meets nothing
 INWARD_MM = 1e-4  # how far off a face a walk starts: more than the rounding of single precision
@@ -208,12 +215,7 @@ def _event(
                     continue
                 w /= ROULETTE_CHANCE
             s, bits = _bits(s)
-            p = _uniform(bits)
-            if g == 0:
-                cosine = 1 - 2 * p
-            else:  # Henyey and Greenstein 1941, inverted
-                q = (1 - g * g) / (1 - g + 2 * g * p)
-                cosine = (1 + g * g - q * q) / (2 * g)
+            cosine = henyey_greenstein(g, _uniform(bits))
             sine = math.sqrt(max(1 - cosine * cosine, 0.0))
             s, bits = _bits(s)
             c, t = _azimuth(bits)
