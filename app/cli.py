@@ -32,6 +32,7 @@ VERBS = {
     "judge": "app.commands.judge",
     "montecarlo": "app.commands.montecarlo",
     "harmonics": "app.commands.harmonics",
+    "skin": "app.commands.skin",
     "illumination": "app.commands.illumination",
     "cache": "app.commands.cache",
 }

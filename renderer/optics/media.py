@@ -35,7 +35,7 @@ SEED = 20240601
 RINGS = 160
 
 #: The published curves: only the six Gaussians of d'Eon and Luebke. Their albedo is that of light
-#: skin under this project's procedural colour; the paper keeps it in a texture.
+#: skin, by eye; the paper keeps it in a texture.
 DEON_LUEBKE = "deon_luebke"
 
 

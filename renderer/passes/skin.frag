@@ -80,21 +80,21 @@ Relief relief(vec3 p, float pixel_mm) {
 
     // pores: two sizes of pits, of depths of their own, missing here and there
     for (int k = 0; k < 2; ++k) {
-        float size = k == 0 ? 1.02 : 0.64, w = k == 0 ? 0.24 : 0.22, shown = fade(size * 0.5, pixel_mm);
+        float size = k == 0 ? 0.92 : 0.60, w = k == 0 ? 0.26 : 0.22, shown = fade(size * 0.5, pixel_mm);
         Spot c = spot(q / size);
         float own = unit(mix_bits(c.id ^ 0x51u));
-        own = own * own * step(0.15, own);
-        float depth = pore_depth * (k == 0 ? 0.050 : 0.026) * pores * own * skin;
+        own = own * step(0.15, own);
+        float depth = pore_depth * (k == 0 ? 0.066 : 0.030) * pores * own * skin;
         float e = exp(-c.f1 * c.f1 / (w * w));
         r.h.x -= shown * depth * e;
         r.h.yzw += shown * depth * e * 2.0 / (w * w) * c.d1 / size;
-        r.pore += (k == 0 ? 1.0 : 0.6) * mix(0.05, e, shown) * (0.25 + 0.75 * own) * pores * skin;
-        float steep = pore_depth * (k == 0 ? 0.050 : 0.026) * pores * skin / size;
-        lose(r, 0.17 * w * 4.0 * steep * steep, shown);
+        r.pore += (k == 0 ? 1.0 : 0.6) * mix(0.19 * w, pow(e, 1.4), shown) * own * pores * skin;
+        float steep = pore_depth * (k == 0 ? 0.066 : 0.030) * pores * skin / size;
+        lose(r, 1.22 * w * steep * steep, shown);
     }
     // three fixed nets of furrows, by region: across on forehead and neck, down and outwards on cheeks, upright about the mouth
     float deep = furrow_depth * 0.018 * skin * (1.0 - 0.6 * pores) * (1.0 - 0.5 * eyelid), shown = fade(0.5, pixel_mm);
-    lose(r, 30.0 * deep * deep, shown);
+    lose(r, 54.0 * deep * deep, shown);
     if (deep * shown > 1e-4) {
         vec3 between = 0.5 * (eye_l + eye_r), off = p - between;
         float side = abs(off.x), up = off.y;
@@ -168,7 +168,7 @@ Relief relief(vec3 p, float pixel_mm) {
         h.x -= amp * pow(g, 4.0);
         h.y += amp * 4.0 * g * g * g * 0.5 * sin(s * wave) * wave;
         float steep = lip_folds * 0.050 * lips * wave;
-        lose(r, 0.25 * steep * steep, held);
+        lose(r, 0.10 * steep * steep, held);
         Spot c = spot(q / 0.8 + 11.0);
         float dome = exp(-c.f1 * c.f1 / 0.09);
         h.yzw -= lip_folds * 0.010 * fade(0.6, pixel_mm) * lips * dome / 0.09 * 2.0 * c.d1 / 0.8;
@@ -373,7 +373,7 @@ void main() {
     float nv = max(dot(n, v), 0.02);
     irradiance *= goes_in_even(nv, m);
     vec3 specular = vec3(0.0);  // left out with DIFFUSE_ONLY
-    float shown = (1.0 - 0.6 * shade) * (1.0 - 0.85 * b.w);
+    float shown = (1.0 - 0.8 * shade) * (1.0 - 0.85 * b.w);
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world);
         float facing = lamp_facing(k, world, n), geometric = dot(smooth_n, l), below = -lamp_sine(k, world);

@@ -181,7 +181,7 @@ class Skin(Material):
     flush: float = parameter(0.026, unit="share of blood more", low=0.0, high=0.3, source="by eye")
     mottling: float = parameter(1.0, low=0.0, high=5.0, source="of what was chosen by eye")
     uneven: tuple[float, float] = parameter(
-        (0.30, 0.26), unit="of melanin, of blood", low=0.0, high=2.0, source="by eye"
+        (0.22, 0.26), unit="of melanin, of blood", low=0.0, high=2.0, source="by eye"
     )
     eyelid_blood: float = parameter(
         0.006, unit="share of blood more", low=0.0, high=0.3, source="by eye"
@@ -203,8 +203,8 @@ class Skin(Material):
     )
     beard: float = parameter(1.0, low=0.0, high=1.3, source="tint of shaven skin, by eye")
     scalp: float = parameter(0.9, source="darkening under hair, by eye", **_SHARE)
-    pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.050 and 0.026 mm")
-    pore_shade: float = parameter(0.22, source="how much darker a deep pore is, by eye", **_SHARE)
+    pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.066 and 0.030 mm")
+    pore_shade: float = parameter(0.30, source="how much darker a deep pore is, by eye", **_SHARE)
     furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.018 mm")
     bumps: float = parameter(1.0, low=0.0, high=5.0, source="height, of 0.022 to 0.16 mm")
     wrinkles: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.020 to 0.045 mm")

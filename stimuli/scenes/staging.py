@@ -81,7 +81,7 @@ def _dressed(model: Model) -> Model:
         surface = replace(surface, masks=np.repeat(everywhere, len(surface.masks), axis=0))
         proxy = replace(proxy, masks=np.repeat(everywhere, len(proxy.positions), axis=0))
     if isinstance(material, Skin) and material.medium == PERSON:
-        medium = material.own_medium(*_face(surface.masks, surface, model.landmarks))
+        medium = material.own_medium(*face(surface, model.landmarks))
         model = replace(model, material=replace(material, medium=medium))
     if "albedo_map" in own:
         proxy = replace(proxy, albedo=_mean_albedo(own["albedo_map"], surface))
@@ -92,12 +92,12 @@ def _dressed(model: Model) -> Model:
 FACE_MM, FACE_BELOW_MM = 95.0, 35.0
 
 
-def _face(masks: np.ndarray, surface: Surface, marks: dict) -> tuple[np.ndarray, np.ndarray]:
+def face(surface: Surface, marks: dict) -> tuple[np.ndarray, np.ndarray]:
     """Masks (N, 8) and areas (N,) of a head's face, or of all of a surface that is no head.
 
     Hair and the mouth's inside do not count: it is the skin's colour that is meant.
     """
-    corners = surface.positions[surface.faces].astype(float)
+    masks, corners = surface.masks, surface.positions[surface.faces].astype(float)
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )

@@ -1,0 +1,84 @@
+"""Procedural skin as the shader draws it: its colour is the model's, its highlights keep energy,
+stay the same at every distance and do not sparkle.
+"""
+
+import numpy as np
+import pytest
+
+import renderer
+from renderer.optics import skin as spectral
+from renderer.scene.material import Skin
+from stimuli import scenes
+
+EVEN = {
+    "uneven": [0.0, 0.0],
+    "mottling": 0.0,
+    "freckles": 0.0,
+    "moles": 0.0,
+    "vessels": 0.0,
+}
+FLAT = {"pores": 0.0, "furrows": 0.0, "bumps": 0.0, "lip_folds": 0.0, "micro_mm": [0.0, 0.0]}
+
+
+def shaded(material, height_mm=12.0, size=48, target=(0.0, 0.0, 0.0), **scene):
+    """Specular light and albedo (H, W, 3) of a slab's face that looks at the camera."""
+    table = {
+        "objects": {"slab": {"shape": "slab", "size_mm": [24.0, 24.0, 10.0]}},
+        "materials": {"slab": {"kind": "skin", **material}},
+        "lights": {"sun": {"direction": [0.0, 0.0, 1.0], "irradiance": [2.0] * 3, "shadow": False}},
+        "camera": {
+            "framing": "slab",
+            "height_mm": height_mm,
+            "angle": "front",
+            "target_mm": list(target),
+        },
+    }
+    graph = scenes.stage(scenes.read_scene(scenes.merge(table, scene))).graph
+    with (
+        renderer.Renderer(graph, (size, size), 1, rays=8, shadow_map=64) as drawing,
+        drawing.frame() as frame,
+    ):
+        return [texture.read()[..., :3].astype(float) for texture in frame.surface.textures[1:3]]
+
+
+@pytest.mark.parametrize(
+    "masks", [{}, {"flush": 0.8}, {"eyelid": 1.0}, {"lips": 1.0}, {"lips": 0.75, "flush": 0.3}]
+)
+def test_the_colour_is_the_spectral_models_and_what_light_bounces_off(masks):
+    """The shader's look-up, the model itself and the mean that the bake takes are one."""
+    skin = Skin(masks=masks, **{k: tuple(v) if isinstance(v, list) else v for k, v in EVEN.items()})
+    row = np.array([[masks.get(name, 0.0) for name in renderer.scene.MASKS]])
+    _, albedo = shaded({**EVEN, **FLAT, "masks": masks})
+    noise = 0.004 if not masks.get("lips") else 0.1  # lips and flush keep some of their own
+    noise = max(noise, 0.02 if masks.get("flush") else 0)
+    expected = skin.mean_albedo(row)[0]
+    np.testing.assert_allclose(albedo.mean(axis=(0, 1)), expected, rtol=noise)
+    model = spectral.colour(skin.layers, *(value[0] for value in skin.pigments(row)))
+    np.testing.assert_allclose(expected, model, rtol=0.02)
+
+
+def test_no_more_light_is_sent_back_than_comes():
+    """A perfect mirror in even light from everywhere, rough and smooth, with all its relief."""
+    mirror = {"f0": 1.0, "f0_oily": 1.0, "masks": {"oil": 0.6, "pores": 0.5}}
+    sky = {"lights": {"sun": False}, "environment": {"ambient": [1.0, 1.0, 1.0]}}
+    specular, _ = shaded(mirror, **sky)
+    assert 0.5 < specular.mean() < 1 and specular.max() < 1.005
+
+
+OILY = {"masks": {"oil": 0.7, "pores": 0.3}, "oil_patches": 0.0}
+
+
+def test_skin_shines_alike_at_every_distance():
+    """Relief that is seen, and the slopes that stand for it where a pixel covers many of them."""
+    near, _ = shaded(OILY, 12.0, 192)  # 0.06 mm a pixel
+    far, _ = shaded(OILY, 96.0, 48)  # 2 mm
+    flat, _ = shaded({**OILY, **FLAT}, 12.0, 48)
+    near, far, flat = near.mean(), far[22:26, 22:26].mean(), flat.mean()
+    assert far == pytest.approx(near, rel=0.2) and flat > 1.3 * near
+
+
+def test_nothing_sparkles():
+    """A shift by a third of a pixel changes a pixel's highlight by a few hundredths."""
+    still, moved = (shaded(OILY, 48.0, 48, (x, 0.0, 0.0))[0][16:32, 16:32] for x in (0.0, 1 / 3))
+    assert still.mean() > 0.01
+    assert np.sqrt(((moved - still) ** 2).mean()) < 0.12 * still.mean()
