@@ -13,8 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from argon2 import PasswordHasher
+from flask import Flask
+from jinja2 import BytecodeCache
+from jinja2.bccache import Bucket
 from PIL import Image
 from sqlalchemy import create_engine, make_url, select, text
+from werkzeug.routing import Rule
 
 from app import accounts, create_app, database
 from app.database import Database
@@ -24,6 +28,39 @@ from app.study import Study
 
 FRAMINGS = ("close-up", "head-shot", "half-length")
 TECHNIQUES = ("none", "jimenez_separable", "golubev", "golubev_plus", "jimenez_gaussian")
+
+
+class Compiled(BytecodeCache):
+    """Templates as they were compiled for the first application of this process."""
+
+    def __init__(self):
+        self.code: dict[str, bytes] = {}
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        if code := self.code.get(bucket.key):
+            bucket.bytecode_from_string(code)
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        self.code[bucket.key] = bucket.bytecode_to_string()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once():
+    """Hundreds of applications are made here: what makes the pages and addresses of one is compiled
+    for the first alone, a sixth of a second each time.
+    """
+    builders, compile_builder = {}, Rule._compile_builder
+
+    def kept(rule: Rule, append_unknown: bool = True):
+        key = rule.rule, str(rule._trace), str(rule.defaults), append_unknown
+        if key not in builders:
+            builders[key] = compile_builder(rule, append_unknown)
+        return builders[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Flask, "jinja_options", {"bytecode_cache": Compiled()})
+        patch.setattr(Rule, "_compile_builder", kept)
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -89,7 +126,7 @@ def migrated_once(monkeypatch):
     monkeypatch.setattr("app.archive.migrate", copied)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def write_study():
     """Write a study folder by hand, no renderer: 15 small PNGs and their manifest; `changes`
     replace keys of the study.
@@ -129,8 +166,14 @@ def study_dir(tmp_path, write_study):
 
 
 @pytest.fixture
-def app(study_dir, monkeypatch):
-    app = create_app(study_dir)
+def database_url():
+    """Where the answers go; None: beside the study."""
+    return None
+
+
+@pytest.fixture
+def app(study_dir, database_url, monkeypatch):
+    app = create_app(study_dir, database_url)
     app.config["LIVE_PERIOD_S"] = 0  # the dashboard's numbers are made anew at once
     monkeypatch.setattr("app.researchers.PAUSE_S", 0)
     monkeypatch.setattr(accounts, "HASHER", PasswordHasher(1, 8, 1))  # as fast as it gets

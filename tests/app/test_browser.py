@@ -4,6 +4,7 @@ of every size.
 
 import hashlib
 import io
+import itertools
 import json
 import re
 import shutil
@@ -18,6 +19,7 @@ from sqlalchemy import select
 from app import accounts, create_app, notes
 from app.models import Participant, Response, Trial
 from app.server import running
+from app.simulation.client import forms
 from stimuli.study import THESIS
 
 FLAGS = [
@@ -48,9 +50,29 @@ def chromium():
         browser.close()
 
 
+@pytest.fixture(scope="module")
+def study_dir(tmp_path_factory, write_study):
+    """One for most tests, so that its pictures are resampled once for each size of window."""
+    return write_study(tmp_path_factory.mktemp("browser") / "study", size=(960, 540))
+
+
+@pytest.fixture(scope="module")
+def short_study(tmp_path_factory, write_study):
+    """One of twelve questions."""
+    folder = tmp_path_factory.mktemp("browser") / "short"
+    return write_study(folder, size=(960, 540), assignment={"pairs": 12})
+
+
 @pytest.fixture
-def study_dir(tmp_path, write_study):
-    return write_study(tmp_path / "study", size=(960, 540))
+def database_url(fresh):
+    return fresh()
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    """URLs of new databases: studies are shared, answers are each test's own."""
+    numbers = itertools.count()
+    return lambda: f"sqlite:///{tmp_path}/{next(numbers)}.sqlite3"
 
 
 @pytest.fixture
@@ -81,6 +103,17 @@ def page(chromium):
 
 
 def begin(page, address):
+    """At the first question; the pages before it are sent off without being drawn."""
+    http = page.request  # with the cookies of the page
+    token = forms(http.get(address).text())[0].fields["csrf_token"]
+    http.post(address, form={"csrf_token": token, "consent": "yes"})
+    http.post(f"{address}familiarity", form={"csrf_token": token, "familiarity": "3"})
+    page.goto(f"{address}question")
+    shown(page, 1)
+
+
+def walk_in(page, address):
+    """The same, page by page."""
     page.goto(address)
     page.check("[name=consent]")
     page.click("text=Begin")
@@ -104,19 +137,39 @@ def stored(app):
         return db.execute(select(Trial, Response).join(Response).order_by(Response.id)).all()
 
 
-def test_all_thirty_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_connection(
-    page, address, app
+def test_all_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_connection(
+    page, short_study, fresh
 ):
-    answers = [(7 * i) % 5 - 2 for i in range(30)]
-    begin(page, address)
-    for number, answer in enumerate(answers, start=1):
+    app = create_app(short_study, fresh())
+    with running(app) as address:
+        answer_all(page, address)
+    rows = stored(app)
+    assert [trial.order for trial, _ in rows] == list(range(1, 13))
+    assert [response.answer for _, response in rows] == ANSWERS
+    assert {response.timed_by for _, response in rows} == {"browser"}
+    assert {(r.viewport_width, r.viewport_height, r.device_pixel_ratio) for _, r in rows} == {
+        (1280, 720, 1.0)
+    }
+    assert all(
+        abs(r.shown_width / r.shown_height - 16 / 9) < 0.01 and r.shown_width > 600 for _, r in rows
+    )
+    assert [trial.order for trial, r in rows if r.times_shown > 1] == [5]
+    assert page.evaluate("Object.keys(localStorage)") == []  # nothing of anybody stays
+
+
+ANSWERS = [(7 * i) % 5 - 2 for i in range(12)]
+
+
+def answer_all(page, address):
+    walk_in(page, address)
+    for number, answer in enumerate(ANSWERS, start=1):
         shown(page, number)
-        if number == 12:  # a choice that is not confirmed is no answer
+        if number == 5:  # a choice that is not confirmed is no answer
             page.keyboard.press("1")
             page.reload()
-            shown(page, 12)
+            shown(page, 5)
             assert page.locator("input[name=answer]:checked").count() == 0
-        if number == 20:
+        if number == 8:
             lose_connection_while_answering(page, answer)
         elif number % 2:
             page.keyboard.press(KEY_OF[answer])
@@ -126,19 +179,6 @@ def test_all_thirty_answers_by_keyboard_and_mouse_with_a_reload_and_a_lost_conne
             page.click("button:text('Confirm')")
     expect(page.locator("#completion-code")).to_have_text(re.compile("^[A-Z2-9]{10}$"))
 
-    rows = stored(app)
-    assert [trial.order for trial, _ in rows] == list(range(1, 31))
-    assert [response.answer for _, response in rows] == answers
-    assert {response.timed_by for _, response in rows} == {"browser"}
-    assert {(r.viewport_width, r.viewport_height, r.device_pixel_ratio) for _, r in rows} == {
-        (1280, 720, 1.0)
-    }
-    assert all(
-        abs(r.shown_width / r.shown_height - 16 / 9) < 0.01 and r.shown_width > 600 for _, r in rows
-    )
-    assert [trial.order for trial, r in rows if r.times_shown > 1] == [12]
-    assert page.evaluate("Object.keys(localStorage)") == []  # nothing of anybody stays
-
 
 def lose_connection_while_answering(page, answer):
     page.context.set_offline(True)
@@ -147,9 +187,9 @@ def lose_connection_while_answering(page, answer):
     expect(page.locator(".status")).to_have_text("Not saved yet, trying again …")
     page.keyboard.press("Enter")  # impatience
     page.wait_for_timeout(1500)
-    expect(page.locator("h1")).to_have_text(re.compile(r"Question 20\s"))
+    expect(page.locator("h1")).to_have_text(re.compile(r"Question 8\s"))
     page.context.set_offline(False)
-    shown(page, 21)
+    shown(page, 9)
 
 
 def test_a_page_closed_without_a_connection_sends_its_answer_when_it_is_opened_again(
@@ -304,27 +344,32 @@ def test_images_are_there_before_they_are_asked_for(page, address, app):
     assert 10 <= len(images) == len(set(images)) <= 15
 
 
-def test_without_scripts_the_whole_questionnaire_works(chromium, address, app):
-    with chromium.new_context(
-        java_script_enabled=False, viewport={"width": 1280, "height": 720}
-    ) as context:
+def test_without_scripts_the_whole_questionnaire_works(chromium, short_study, fresh):
+    app = create_app(short_study, fresh())
+    with (
+        running(app) as address,
+        chromium.new_context(
+            java_script_enabled=False, viewport={"width": 1280, "height": 720}
+        ) as context,
+    ):
         page = context.new_page()
         page.goto(address)
         page.check("[name=consent]")
         page.click("text=Begin")
         page.get_by_label("Some familiarity").check()
         page.click("text=Continue")
-        for number in range(1, 31):
+        for number in range(1, 13):
             expect(page.locator("h1")).to_have_text(re.compile(rf"Question {number}\s"))
             page.get_by_label("A, slightly").check()
             page.click("button:text('Confirm')")
         expect(page.locator("#completion-code")).to_be_visible()
-    assert [r.answer for _, r in stored(app)] == [-1] * 30
+    assert [r.answer for _, r in stored(app)] == [-1] * 12
 
 
-@pytest.mark.parametrize(
-    "width, height, beside",
-    [
+def test_images_are_as_large_as_the_window_allows(page, address):
+    """960 x 540 is 1920 x 1080 at 200 % zoom; phones stand and lie."""
+    begin(page, address)
+    for width, height, beside in (
         (1920, 1080, True),
         (1280, 720, True),
         (960, 540, True),
@@ -333,25 +378,23 @@ def test_without_scripts_the_whole_questionnaire_works(chromium, address, app):
         (390, 844, False),
         (390, 660, False),
         (768, 1024, False),
-    ],
-)
-def test_images_are_as_large_as_the_window_allows(page, address, width, height, beside):
-    """960 x 540 is 1920 x 1080 at 200 % zoom; phones stand and lie."""
-    page.set_viewport_size({"width": width, "height": height})
-    begin(page, address)
-    a, b = (page.locator(".pair canvas").nth(i).bounding_box() for i in (0, 1))
-    assert (a["y"] == b["y"]) == beside and (a["x"] == b["x"]) != beside
-    assert a["width"] == b["width"] and abs(a["width"] / a["height"] - 16 / 9) < 0.02
-    room = page.locator(".pair").bounding_box()
-    across, down = (width / 2, room["height"]) if beside else (width, room["height"] / 2)
-    # but for the gap, the labels, and the steps of 16 pixels
-    assert a["width"] > min(across - 8, (down - 28) * 16 / 9) - 16
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    assert page.evaluate("document.documentElement.scrollHeight <= innerHeight + 1")
-    for label in page.locator(".options label").all():
-        assert label.evaluate(
-            "(l) => l.scrollWidth <= l.clientWidth && l.getBoundingClientRect().height >= 40"
-        )
+    ):
+        page.set_viewport_size({"width": width, "height": height})
+        page.reload()
+        shown(page, 1)
+        a, b = (page.locator(".pair canvas").nth(i).bounding_box() for i in (0, 1))
+        assert (a["y"] == b["y"]) == beside and (a["x"] == b["x"]) != beside
+        assert a["width"] == b["width"] and abs(a["width"] / a["height"] - 16 / 9) < 0.02
+        room = page.locator(".pair").bounding_box()
+        across, down = (width / 2, room["height"]) if beside else (width, room["height"] / 2)
+        # but for the gap, the labels, and the steps of 16 pixels
+        assert a["width"] > min(across - 8, (down - 28) * 16 / 9) - 16, (width, height)
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert page.evaluate("document.documentElement.scrollHeight <= innerHeight + 1")
+        for label in page.locator(".options label").all():
+            assert label.evaluate(
+                "(l) => l.scrollWidth <= l.clientWidth && l.getBoundingClientRect().height >= 40"
+            )
 
 
 @pytest.mark.parametrize(
@@ -366,16 +409,14 @@ def test_one_file_is_drawn_alike_on_both_sides(noise_study, chromium, width, hei
     """
     flags = [f"--force-device-scale-factor={ratio}", f"--window-size={width},{height}"]
     launch = chromium.browser_type.launch
-    exact, fitted = noise_study("exact"), noise_study("fit", display="fit")
-    triplets = noise_study("triplet", modes=["triplet"], reference="none")
-    boosted = noise_study("boosted", modes=["boosted"], reference="none", boost={"zoom": 3})
-    with Image.open(next((exact / "images").glob("*.png"))) as file:
-        noise = np.asarray(file)[108:432, 96:864]  # of the region [0.1, 0.2, 0.9, 0.8]
+    triplets = noise_study(modes=["triplet"], reference="none")
+    boosted = noise_study(modes=["boosted"], reference="none", boost={"zoom": 3})
+    noise = NOISE[108:432, 96:864]  # of the region [0.1, 0.2, 0.9, 0.8]
     with (
-        running(create_app(exact)) as address,
-        running(create_app(fitted)) as fitted_address,
-        running(create_app(triplets)) as triplet_address,
-        running(create_app(boosted)) as boosted_address,
+        running(noise_study()) as address,
+        running(noise_study(display="fit")) as fitted_address,
+        running(triplets) as triplet_address,
+        running(boosted) as boosted_address,
         launch(executable_path=chromium_path(), args=[*FLAGS, *flags]) as browser,
         browser.new_context(no_viewport=True) as context,
     ):
@@ -416,23 +457,37 @@ def test_one_file_is_drawn_alike_on_both_sides(noise_study, chromium, width, hei
                 np.testing.assert_array_equal(one, middle(blocks, one.shape))
 
 
-@pytest.fixture
-def noise_study(tmp_path, write_study):
-    """Studies in which every image is the same noise, 960 x 540, with a region."""
+#: What every image of `noise_study` shows, 960 x 540.
+NOISE = np.random.default_rng(0).integers(0, 256, (540, 960, 3)).astype(np.uint8)
 
-    def write(name, **viewer):
-        directory = write_study(tmp_path / name, size=(960, 540), viewer=viewer)
+
+@pytest.fixture(scope="module")
+def noise_folder(tmp_path_factory, write_study):
+    """Folders of studies in which every image is the same noise with a region, by their viewers."""
+    root, out = tmp_path_factory.mktemp("noise"), io.BytesIO()
+    Image.fromarray(NOISE).save(out, "PNG")
+    digest = hashlib.sha256(out.getvalue()).hexdigest()
+
+    def write(**viewer):
+        name = hashlib.sha256(repr(viewer).encode()).hexdigest()[:8]
+        if (root / name).exists():
+            return root / name
+        directory = write_study(root / name, size=(960, 540), viewer=viewer)
         manifest = json.loads((directory / "manifest.json").read_text())
         manifest["format"] = "subdermal-manifest/3"
-        noise = np.random.default_rng(0).integers(0, 256, (540, 960, 3)).astype(np.uint8)
         for one in manifest["images"]:
-            Image.fromarray(noise).save(directory / one["file"])
-            one["sha256"] = hashlib.sha256((directory / one["file"]).read_bytes()).hexdigest()
-            one["region"] = [0.1, 0.2, 0.9, 0.8]
+            (directory / one["file"]).write_bytes(out.getvalue())
+            one |= {"sha256": digest, "region": [0.1, 0.2, 0.9, 0.8]}
         (directory / "manifest.json").write_text(json.dumps(manifest))
         return directory
 
     return write
+
+
+@pytest.fixture
+def noise_study(noise_folder, fresh):
+    """Applications over these studies, each with a new database."""
+    return lambda **viewer: create_app(noise_folder(**viewer), fresh())
 
 
 def on_screen(page, ratio):
@@ -490,7 +545,7 @@ def test_no_frame_is_blank_while_images_are_swapped_and_it_is_recorded(page, add
 
 def test_both_images_zoom_and_move_together(noise_study, chromium):
     with (
-        running(create_app(noise_study("exact", surround=40))) as address,
+        running(noise_study(surround=40)) as address,
         chromium.new_context(viewport={"width": 900, "height": 700}) as context,
     ):
         page = context.new_page()
@@ -520,7 +575,7 @@ def test_both_images_zoom_and_move_together(noise_study, chromium):
 def test_fingers_swap_zoom_and_move(noise_study, chromium):
     screen = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
     with (
-        running(create_app(noise_study("exact"))) as address,
+        running(noise_study()) as address,
         chromium.new_context(**screen) as context,
     ):
         page = context.new_page()
@@ -642,8 +697,8 @@ def test_the_pages_of_researchers_fit_a_phone_and_axe_finds_nothing(page, addres
     expect(page.locator(".note .text").first).to_have_text("<b>two</b>\nlines")
 
 
-def test_the_simulated_study_is_marked(page, study_dir):
-    with running(create_app(study_dir, simulated=True)) as address:
+def test_the_simulated_study_is_marked(page, study_dir, fresh):
+    with running(create_app(study_dir, fresh(), simulated=True)) as address:
         page.goto(address)
         expect(page.locator(".simulated")).to_be_visible()
         assert page.title().startswith("SIMULATED")
