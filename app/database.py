@@ -19,6 +19,7 @@ from sqlalchemy import Connection, Engine, create_engine, delete, event, make_ur
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 from sqlalchemy.orm import Session
 
+from app import postgresql
 from app.errors import InputError
 from app.models import Live, Participant, StudyRecord
 
@@ -180,8 +181,8 @@ def connect(url: str) -> Engine:
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", _configure_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
-    if engine.dialect.name == "postgresql":
-        event.listen(engine, "begin", _begin_postgresql)
+    if engine.dialect.driver == "pg8000":
+        postgresql.listen(engine)
     return engine
 
 
@@ -203,14 +204,6 @@ def _begin_sqlite(connection) -> None:
     writes = connection.get_execution_options().get("writes", False)
     # by the driver itself: SQLAlchemy would take as long again to hand it on
     connection.connection.driver_connection.execute("BEGIN IMMEDIATE" if writes else "BEGIN")
-
-
-def _begin_postgresql(connection) -> None:
-    """A reader sees one snapshot, as it does in SQLite; writers lock the rows that they decide
-    by.
-    """
-    if not connection.get_execution_options().get("writes", False):
-        connection.exec_driver_sql("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
 
 
 def migrate(connection: Connection) -> None:

@@ -187,6 +187,7 @@ def upcoming(
 
 _UPCOMING = (
     select(Trial.id, Trial.order, Trial.cell, Trial.left, Trial.right, Trial.kind)
+    .execution_options(prepared=True)
     .where(Trial.participant_id == bindparam("participant"))
     .where(Trial.order.between(bindparam("first"), bindparam("last")))
     .order_by(Trial.order)
@@ -356,7 +357,9 @@ _STANDS = (
     Participant.screen,
     Participant.study_state.expression.label("study_state"),
 )
-_STANDING = select(*_STANDS).where(Participant.visit == bindparam("visit"))
+_STANDING = (
+    select(*_STANDS).where(Participant.visit == bindparam("visit")).execution_options(prepared=True)
+)
 _DUE = (
     select(
         *_STANDS,
@@ -371,8 +374,9 @@ _DUE = (
     .outerjoin(Trial, (Trial.participant_id == Participant.id) & (Trial.id == bindparam("trial")))
     .outerjoin(Response, Response.trial_id == Trial.id)
     .where(Participant.visit == bindparam("visit"))
+    .execution_options(prepared=True)
 )
-_APPEND = insert(Response.__table__)
+_APPEND = insert(Response.__table__).inline().execution_options(prepared=True)
 _RECORDED = tuple(name for name in Answer.__dataclass_fields__ if name not in ("value", "rt_ms"))
 
 

@@ -1,6 +1,7 @@
 """Durable, migrated, of one kind and one study for ever."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -174,3 +175,15 @@ def test_the_history_of_the_schema_is_one_line():
     assert [one.revision for one in line] == numbers
     assert [one.down_revision for one in line] == [None, *numbers[:-1]]
     assert [Path(one.path) for one in line] == files
+
+
+@pytest.mark.skipif("POSTGRES_URL" not in os.environ, reason="about PostgreSQL")
+def test_what_every_answer_asks_for_is_prepared_and_readers_see_one_snapshot(app, person):
+    person().begin().answer(1, 2)
+    database = app.extensions["database"]
+    with database.look() as connection:
+        asked = "SELECT count(*) FROM pg_prepared_statements WHERE statement LIKE '%participants%'"
+        assert connection.execute(text(asked)).scalar() >= 2
+        assert connection.execute(text("SHOW transaction_isolation")).scalar() == "repeatable read"
+    with database.append() as connection:
+        assert connection.execute(text("SHOW transaction_isolation")).scalar() == "read committed"
