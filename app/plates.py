@@ -1,12 +1,12 @@
 """Pseudo-isochromatic plates: dots among which a digit can be read by colour alone.
 
-Drawn by us, from a model of dichromacy: figure and ground differ only in what a protanope (or a
-deuteranope) lacks, the excitation of the long (or middle) wavelength cones, so that to them both
-are one colour. Cones are those of Vienot, Brettel and Mollon 1999, "Digital video colourmaps for
-checking the legibility of displays by dichromats", Color Research and Application 24(4), 243-252,
-doi:10.1002/(SICI)1520-6378(199908)24:4<243::AID-COL5>3.0.CO;2-3: sRGB phosphors, Smith and
-Pokorny's fundamentals. Each dot's light is scaled at random, the figure's as the ground's, so that
-brightness says nothing. The first plate is for everybody: its digit is lighter.
+Drawn by us, from a model of dichromacy: figure and ground differ only in what a protanope (a
+deuteranope, a tritanope) lacks, the excitation of the long (middle, short) wavelength cones, so
+that to them both are one colour. Cones are those of Vienot, Brettel and Mollon 1999, "Digital video
+colourmaps for checking the legibility of displays by dichromats", Color Research and Application
+24(4), 243-252, doi:10.1002/(SICI)1520-6378(199908)24:4<243::AID-COL5>3.0.CO;2-3: sRGB phosphors,
+Smith and Pokorny's fundamentals. Each dot's light is scaled at random, the figure's as the
+ground's, so that brightness says nothing. The first plate is for everybody: its digit is lighter.
 
 They tell apart who reads and who does not, on an uncalibrated screen; they are no diagnosis.
 """
@@ -28,12 +28,12 @@ CONES = np.array(
     ]
 )
 #: What a plate is for, and the cone in which figure and ground differ; of "everybody" none.
-KINDS = {"everybody": None, "protan": 0, "deutan": 1}
+KINDS = {"everybody": None, "protan": 0, "deutan": 1, "tritan": 2}
 #: Digits that are not taken for one another where a dot is missing.
 DIGITS = "2345679"
-#: Of the figure to either side of the mean colour, linear sRGB; the widest that stays in gamut.
+#: Of the figure to either side of the mean colour, linear sRGB; what stays in gamut.
 MEAN = np.array([0.36, 0.26, 0.14])
-APART = 0.17
+APART = {"protan": 0.17, "deutan": 0.17, "tritan": 0.11}
 #: Each dot's light is scaled by a factor between these; the mean of a lighter figure's.
 SCALES, LIGHTER = (0.55, 1.45), 1.6
 SIZE, RADII = 440, (4.0, 9.0)  # CSS pixels
@@ -64,8 +64,8 @@ class Plate:
             scale[~figure] *= 0.6 / scale[~figure].mean()
         else:
             direction = np.linalg.inv(CONES)[:, cone]
-            direction = APART * direction / np.abs(direction).max()
-            sign = 1.0 if direction[0] > 0 else -1.0  # the figure is the redder
+            direction = APART[self.kind] * direction / np.abs(direction).max()
+            sign = 1.0 if direction[0] > 0 else -1.0  # the figure is the redder or yellower
             colours += np.where(figure[:, None], sign, -sign) * direction
         return places, figure, colours * scale[:, None]
 
@@ -85,23 +85,25 @@ class Plate:
         return file.getvalue()
 
 
-def plates(seed: int, count: int) -> tuple[Plate, ...]:
-    """The plates of a study: the first for everybody, then protan and deutan in turn; digits are
-    drawn from its seed, neighbours differ.
+def plates(
+    seed: int, count: int, kinds: tuple[str, ...] = ("protan", "deutan")
+) -> tuple[Plate, ...]:
+    """The plates of a study: the first for everybody, then of the kinds in turn; digits are drawn
+    from its seed, neighbours differ.
     """
     rng = np.random.Generator(np.random.PCG64([seed, count]))
     made: list[Plate] = []
     for k in range(count):
-        kind = "everybody" if not k else ("protan", "deutan")[(k + 1) % 2]
+        kind = kinds[(k - 1) % len(kinds)] if k else "everybody"
         known = [digit for digit in DIGITS if not made or digit != made[-1].digit]
         made.append(Plate(kind, known[int(rng.integers(len(known)))], (seed, count, k)))
     return tuple(made)
 
 
 @lru_cache(maxsize=64)
-def picture(seed: int, count: int, number: int) -> bytes:
+def picture(seed: int, count: int, kinds: tuple[str, ...], number: int) -> bytes:
     """The PNG of a study's plate, from 1."""
-    return plates(seed, count)[number - 1].png()
+    return plates(seed, count, kinds)[number - 1].png()
 
 
 def read(given: list[str], seed: int) -> int:

@@ -341,6 +341,11 @@ def read_pages(table: Table) -> Pages:
     return pages
 
 
+#: What colour plates tell: who lacks the cones for long, middle or short wavelengths (red and green
+#: are confused by the first two, blue and yellow by the third).
+PLATE_KINDS = ("protan", "deutan", "tritan")
+
+
 @dataclass(frozen=True)
 class Screen:
     """A page that looks at the screen before the questions.
@@ -353,6 +358,7 @@ class Screen:
     distance_cm at which people are asked to sit; degrees of visual angle follow from it
     plates      so many plates of dots that tell who sees colours as most do, 0 to 12; 0: none
     plates_read who reads fewer of them is thanked and asked no further; 0: nobody is
+    plate_kinds what those after the first can be read by, in turn: of `PLATE_KINDS`
     """
 
     check: bool = False
@@ -363,9 +369,11 @@ class Screen:
     distance_cm: int = 60
     plates: int = 0
     plates_read: int = 0
+    plate_kinds: tuple[str, ...] = ("protan", "deutan")
 
     def record(self) -> dict:
-        return {**vars(self), "least_px": list(self.least_px)}
+        lists = {"least_px": list(self.least_px), "plate_kinds": list(self.plate_kinds)}
+        return {**vars(self), **lists}
 
 
 def read_screen(table: Table) -> Screen:
@@ -374,7 +382,11 @@ def read_screen(table: Table) -> Screen:
     def size(value: list) -> bool:
         return len(value) == 2 and all(type(side) is int and 0 <= side <= 20000 for side in value)
 
+    def kinds(value: list) -> bool:
+        return bool(value) and all(one in PLATE_KINDS for one in value)
+
     truth = {"kind": bool, "expected": "true or false"}
+    known = f"a list of {', '.join(PLATE_KINDS)}"
     screen = Screen(
         table.take("check", default=bool(table.value), **truth),
         tuple(table.take("least_px", list, "[width, height] in pixels", size, default=[0, 0])),
@@ -384,6 +396,7 @@ def read_screen(table: Table) -> Screen:
         table.number("distance_cm", 10, 1000, default=60),
         plates := table.number("plates", 0, 12, default=0),
         table.number("plates_read", 0, plates, default=0),
+        tuple(table.take("plate_kinds", list, known, kinds, default=list(Screen.plate_kinds))),
     )
     table.end()
     return screen

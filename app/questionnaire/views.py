@@ -228,7 +228,7 @@ def plate(number: int):
     wanted = study().definition.screen
     if not 1 <= number <= wanted.plates:
         abort(404, gettext("This study has no such image."))
-    data = plates.picture(study().seed, wanted.plates, number)
+    data = plates.picture(study().seed, wanted.plates, wanted.plate_kinds, number)
     return current_app.response_class(data, mimetype="image/png")
 
 

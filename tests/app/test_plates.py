@@ -9,11 +9,17 @@ from PIL import Image
 from app import create_app, export
 from app.models import Participant
 from app.plates import CONES, DIGITS, KINDS, Plate, plates
+from stimuli.asking import PLATE_KINDS
 from stimuli.errors import InputError
 from tests.app.conftest import Person
 
-#: What the missing cone is taken for, of the other two (Vienot, Brettel and Mollon 1999).
-SEEN_AS = {"protan": (0, [0.0, 2.02344, -2.52581]), "deutan": (1, [0.494207, 0.0, 1.24827])}
+#: What the missing cone is taken for, of the other two (Vienot, Brettel and Mollon 1999); they give
+#: none for tritanopes, for whom any linear form says the same here: half of the others' mean.
+SEEN_AS = {
+    "protan": (0, [0.0, 2.02344, -2.52581]),
+    "deutan": (1, [0.494207, 0.0, 1.24827]),
+    "tritan": (2, [0.25, 0.25, 0.0]),
+}
 
 
 def separation(values, figure):
@@ -22,7 +28,7 @@ def separation(values, figure):
     return above.mean()
 
 
-@pytest.mark.parametrize("kind", ["protan", "deutan"])
+@pytest.mark.parametrize("kind", SEEN_AS)
 def test_a_dichromat_sees_one_colour_and_others_two(kind):
     cone, weights = SEEN_AS[kind]
     for digit in DIGITS[:3]:
@@ -44,7 +50,12 @@ def test_a_dichromat_sees_one_colour_and_others_two(kind):
 def test_the_first_plate_is_for_everybody_and_dots_do_not_touch():
     first, *others = plates(7, 6)
     assert [one.kind for one in others] == ["protan", "deutan", "protan", "deutan", "protan"]
-    assert set(KINDS) == {first.kind, "protan", "deutan"}
+    assert [one.kind for one in plates(7, 4, ("tritan", "protan"))[1:]] == [
+        "tritan",
+        "protan",
+        "tritan",
+    ]
+    assert set(KINDS) == {first.kind, *PLATE_KINDS}
     places, figure, colours = first.dots
     assert separation(colours.sum(axis=1), figure) > 0.95
     apart = np.hypot(*(places[:, None, :2] - places[None, :, :2]).transpose(2, 0, 1))
