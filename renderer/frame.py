@@ -80,6 +80,7 @@ class Frame:
 
     def _draw_surfaces(self) -> None:
         r = self.renderer
+        r.surfaces.look(self.view.eye)
         self.surface = gl.Target(self.width, self.height, list(FORMATS), depth=True)
         self.surface.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True)
         # depth first: the shading passes then touch each pixel once

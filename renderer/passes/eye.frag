@@ -1,77 +1,131 @@
-// Eyeball: refracting cornea over a lit iris, veined sclera, one wet surface.
+// An eye: a cornea that refracts, an iris behind it, a sclera with vessels, the corner's tissue, and tears over all of it.
 #include "shaders/common.glsl"
 #include "shaders/noise.glsl"
 #include "shaders/lighting.glsl"
 #include "passes/surface_out.glsl"
-uniform vec3 centre; uniform vec3 gaze; uniform float radius; uniform float iris_radius;
+#include "passes/lids.glsl"
+#include "passes/cornea.glsl"
+uniform vec3 centre; uniform vec3 gaze;
+uniform float size;                    // mm in the world, a mm of the head
+uniform sampler2D edges; uniform int has_edges;
+uniform sampler2D vessels; uniform float vessels_rad;
 uniform vec3 iris_base; uniform vec3 iris_fibres; uniform vec3 iris_collarette; uniform vec3 sclera_colour;
+uniform float pupil_mm; uniform float limbus_mm; uniform float limbus; uniform float veins; uniform float redness;
+uniform float lid_shade; uniform float lid_shade_mm; uniform float meniscus_mm;
+uniform vec3 noise_origin;
+const float F0 = 0.0207;               // Fresnel at the tears' index of 1.336
+// Radians over which a lamp's edge is blurred in the tears: over the cornea, and over the uneven sclera and the corner's tissue.
+const vec2 SMOOTH = vec2(0.012, 0.09);
+
+// Colour of the iris at q, mm of the gaze's frame; detail finer than a pixel fades.
+vec3 iris_colour(vec2 q, float pixel_mm, float seed) {
+    float rim = length(q), pupil = pupil_mm, outer = iris_radius;
+    float t = clamp((rim - pupil) / (outer - pupil), 0.0, 1.2);  // 0 at the pupil, 1 at the root
+    vec2 around = q / max(rim, 1e-3);
+    vec2 wind = around + 0.045 * vec2(noise(vec3(around * 6.0, t * 3.0 + seed)), noise(vec3(around * 6.0, t * 3.0 + 9.0 + seed)));
+    float sharp = 1.0 / (1.0 + 30.0 * pixel_mm * pixel_mm);
+    // fibres: radial strands, finer ones over coarser ones, that wind a little
+    float fibre = 0.50 * noise(vec3(wind * 15.0, t * 1.1 + seed)) + 0.38 * noise(vec3(wind * 32.0, t * 1.8 + seed + 4.0)) * (0.4 + 0.6 * sharp)
+        + 0.30 * noise(vec3(wind * 62.0, t * 2.6 + seed + 8.0)) * sharp;
+    vec3 c = mix(iris_base, iris_fibres, clamp(0.42 + 0.95 * fibre, 0.0, 1.25));
+    // the collarette: a wavy ring a third of the way out; within it the pupillary zone, flatter and warmer
+    float ring = 0.30 + 0.07 * noise(vec3(around * 4.0, seed + 1.0)) + 0.05 * noise(vec3(around * 11.0, seed + 2.0));
+    float within = 1.0 - smoothstep(ring - 0.10, ring + 0.14, t);
+    c = mix(c, iris_collarette * (1.0 + 0.40 * fibre), 0.46 * within);
+    c = mix(c, iris_collarette * (1.05 + 0.8 * fibre), 0.30 * exp(-pow((t - ring - 0.16) / 0.16, 2.0)));
+    c *= 1.0 + 0.30 * exp(-pow((t - ring) / 0.045, 2.0));
+    // crypts: gaps between strands that show the dark stroma, mostly just outside the collarette
+    Cells gap = cells(vec3(wind * 4.6, t * 2.7 + seed));
+    float crypt = smoothstep(0.42, 0.18, gap.f1) * step(0.62, unit(mix_bits(gap.id ^ 5u))) * smoothstep(ring, ring + 0.07, t) * (1.0 - smoothstep(0.62, 0.85, t));
+    c *= 1.0 - 0.55 * crypt;
+    // furrows of contraction: faint arcs near the root
+    float arc = (t + 0.02 * noise(vec3(around * 3.0, seed))) * 9.0;
+    c *= 1.0 - 0.10 * smoothstep(0.55, 0.75, t) * pow(0.5 + 0.5 * cos(2.0 * PI * arc), 4.0);
+    // the root is dark, the ruff about the pupil too
+    c *= mix(1.0, 0.42, smoothstep(0.72, 1.02, t));
+    c *= mix(0.35, 1.0, smoothstep(0.0, 0.055, t));
+    float edge = max(0.045, 0.7 * pixel_mm);
+    c *= 0.82;
+    return c * smoothstep(pupil - edge, pupil + edge, rim + 0.02 * noise(vec3(around * 9.0, 2.0)));
+}
 
 void main() {
-    vec3 n = normalize(world_normal);
     vec3 v = normalize(camera_position - world);
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
+    float tissue = a.x, caruncle = a.y, pixel_mm = footprint_mm() / size;
     vec3 up = normalize(vec3(0.0, 1.0, 0.0) - gaze * gaze.y), side = cross(up, gaze);
-    vec3 local = vec3(dot(world - centre, side), dot(world - centre, up), dot(world - centre, gaze));
-    float rim = length(local.xy);
+    mat3 frame = mat3(side, up, gaze);                  // of the gaze to the world
+    vec3 own = (world - centre) / size, p = own * frame;  // mm from the centre, in the world's axes and in the gaze's
+    vec3 front = transpose(mat3(model)) * own / size;     // in the head's axes
+    float rim = length(p.xy);
 
-    // the ray bent into the aqueous humour meets the iris plane
-    vec3 inside = refract(-v, n, 1.0 / 1.336);
-    vec3 ray = vec3(dot(inside, side), dot(inside, up), dot(inside, gaze));
-    float plane = sqrt(radius * radius - iris_radius * iris_radius) - 0.3;
-    float t = (plane - local.z) / min(ray.z, -0.15);
-    vec2 iris = (local + ray * max(t, 0.0)).xy / iris_radius;
-    float r = length(iris), angle = atan(iris.y, iris.x);
+    // the cornea's normal is exact: the mesh is not fine enough for a mirror
+    vec3 n = normalize(world_normal);
+    float in_cap = (1.0 - tissue) * (1.0 - smoothstep(iris_radius - 0.22, iris_radius + 0.22, rim)) * step(0.0, p.z);
+    n = normalize(mix(n, frame * normalize(p - vec3(0.0, 0.0, cap_z())), in_cap));
 
-    // iris: radial fibres, a warm collarette, a dark rim, the pupil
-    float fibre = 0.0;
-    vec2 around = vec2(cos(angle), sin(angle));
-    fibre += 0.55 * noise(vec3(around * 13.0, r * 2.2)) + 0.35 * noise(vec3(around * 31.0, r * 3.5 + 4.0)) + 0.22 * noise(vec3(around * 60.0, r * 6.0));
-    float pupil = 0.33;
-    float collar = exp(-pow((r - 0.50 - 0.04 * noise(vec3(around * 5.0, 1.0))) / 0.11, 2.0));
-    vec3 iris_colour = mix(iris_base, iris_fibres, clamp(0.5 + 0.8 * fibre, 0.0, 1.0));
-    iris_colour = mix(iris_colour, iris_collarette, 0.65 * collar);
-    iris_colour *= 1.0 - 0.20 * smoothstep(0.15, 0.85, noise(vec3(iris * 6.0, 3.0)));
-    iris_colour *= mix(0.30, 1.0, smoothstep(1.02, 0.80, r));
-    iris_colour *= smoothstep(pupil - 0.025, pupil + 0.035, r + 0.008 * noise(vec3(around * 8.0, 2.0)));
+    // how far the lids' edges are, and their shade
+    vec2 edge = has_edges == 1 ? to_edges(edges, edges_mm, front.xy) : vec2(20.0);
+    float under = lid_shade * exp(-max(edge.x, 0.0) / lid_shade_mm), over = 0.5 * lid_shade * exp(-max(edge.y, 0.0) / (0.4 * lid_shade_mm));
+    float corner = 0.20 * lid_shade * (1.0 - tissue) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 2.5);
+    vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner)), vec3(0.90, 1.06, 1.08));  // lids send back red light
 
-    // sclera: warm white, veins that fade towards the cornea
-    vec3 sclera = sclera_colour * (1.0 + 0.03 * noise(local / 2.5));
-    vec3 q = local / vec3(1.0, 1.0, 1.4);
-    float vein = 0.0;
-    for (int k = 0; k < 2; ++k) {
-        float scale = k == 0 ? 3.1 : 1.5;
-        vec3 bend = vec3(noise(q / 1.4), noise(q / 1.4 + 9.0), noise(q / 1.4 + 5.0));
-        Cells c = cells(q / scale + 0.35 * bend + float(k) * 7.0);
-        vein += (k == 0 ? 1.0 : 0.6) * smoothstep(0.055, 0.0, c.f2 - c.f1);
+    // iris, seen through the cornea
+    vec3 q = to_iris(p, n * frame, -v * frame);
+    float seed = floor(noise_origin.x) * 0.37;
+    vec3 iris = iris_colour(q.xy, pixel_mm, seed);
+
+    // sclera: vessels that lie on the ball, more red in the corners and below the lids
+    float angle = acos(clamp(p.z / max(length(p), 1e-3), -1.0, 1.0));
+    vec2 on_map = p.xy / max(rim, 1e-3) * angle / vessels_rad;
+    float vessel = texture(vessels, on_map * 0.5 + 0.5).r;
+    vec3 solid = front + noise_origin;
+    float outward = smoothstep(iris_radius * 1.1, iris_radius * 1.95, rim);
+    vec3 sclera = sclera_colour * (1.0 + 0.05 * fbm(solid / 2.2));
+    float flush = redness * (0.10 + 0.42 * outward + 0.20 * exp(-max(min(edge.x, edge.y), 0.0) / 0.8)) * (0.8 + 0.5 * fbm(solid / 3.1 + 5.0));
+    sclera *= exp(-max(flush, 0.0) * vec3(0.10, 0.52, 0.50));
+    sclera *= exp(-veins * vessel * vec3(0.55, 1.9, 1.75) * (0.55 + 0.45 * outward));
+    // the limbus: the sclera overlaps the cornea softly, and a grey-blue ring lies under it
+    float ragged = 0.16 * noise(vec3(normalize(p.xy + 1e-4) * 5.0, seed)) + 0.06 * noise(vec3(normalize(p.xy + 1e-4) * 17.0, seed));
+    float white = smoothstep(iris_radius - 0.62 * limbus_mm, iris_radius + 0.38 * limbus_mm, rim + ragged);
+    white = max(white, step(p.z, 0.0));
+    vec3 albedo = mix(iris, sclera, white);
+    float ring = exp(-pow((rim - iris_radius + 0.12 * limbus_mm) / (0.62 * limbus_mm), 2.0)) * step(0.0, p.z);
+    albedo *= 1.0 - limbus * ring * vec3(1.0, 0.98, 0.90);
+    // the corner: the fold is pink, the caruncle redder and dull
+    vec3 flesh = mix(vec3(0.58, 0.33, 0.30), vec3(0.60, 0.31, 0.26), caruncle) * (1.0 + 0.16 * fbm(solid / 0.55) - 0.10 * fbm(solid / 0.25));
+    albedo = mix(albedo, flesh, tissue);
+
+    // tears: thin everywhere, with a meniscus along the lids where the normal swings away from them
+    vec3 wet_n = n;
+    if (has_edges == 1 && meniscus_mm > 0.0) {
+        for (int k = 0; k < 2; ++k) {
+            float d = k == 0 ? edge.x : edge.y, tall = k == 0 ? 0.6 * meniscus_mm : meniscus_mm * (1.0 + 0.25 * noise(solid / 1.7));
+            float t = 1.0 - clamp(d / tall, 0.0, 1.0);
+            vec2 away = away_from_edge(edges, edges_mm, front.xy, k);
+            wet_n = normalize(wet_n + mat3(model) * vec3(away, 0.15) / size * (1.9 * t * t));
+        }
     }
-    float outward = smoothstep(iris_radius * 1.15, iris_radius * 2.0, rim);
-    sclera = mix(sclera, vec3(0.50, 0.16, 0.13), clamp(vein * 0.38 * outward * (0.4 + 0.6 * unit(hash3(ivec3(floor(q / 2.0))))), 0.0, 0.7));
-    sclera = mix(sclera, sclera * vec3(1.0, 0.80, 0.76), 0.55 * outward);
-    float limbus = smoothstep(iris_radius * 0.90, iris_radius * 1.10, rim + 0.12 * noise(local * 1.3));
-    vec3 albedo = mix(iris_colour, sclera, limbus);
-    albedo = mix(albedo, albedo * vec3(0.60, 0.60, 0.62), 1.0 - smoothstep(0.0, 0.9, abs(rim - iris_radius) / 0.9));
+    float lumps = mix(mix(0.010, 0.055, white), 0.20, tissue) / (1.0 + 20.0 * pixel_mm * pixel_mm);
+    wet_n = normalize(wet_n + lumps * vec3(noise(solid / 0.7), noise(solid / 0.7 + 7.0), noise(solid / 0.7 + 13.0)));
 
-    vec3 irradiance = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
-    vec3 specular = vec3(0.0);
-    float f0 = 0.025;
-    vec3 flat_n = gaze;
+    vec3 baked = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
+    vec3 irradiance = baked;
+    vec3 specular = vec3(0.0), r = reflect(-v, wet_n), qn = vec3(q.xy, iris_z(length(q.xy)));
+    if (dot(r, n) < 0.0) r = normalize(r - n * (dot(r, n) - 0.02));
+    float nv = max(dot(wet_n, v), 0.02), mirror = schlick(F0, nv);
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world), light_here = lamp_light(k, world);
         float seen = visibility(k, world, n, phase);
-        // the iris is lit through the cornea: flat, and brighter opposite the lamp (a cheap caustic)
-        vec2 across = vec2(dot(l, side), dot(l, up));
-        float focus = 1.0 + 0.9 * clamp(-dot(iris, across), -0.5, 1.0);
-        float on_iris = max(dot(flat_n, l), 0.0) * focus, on_white = smoothstep(-0.25, 1.0, dot(n, l));
-        irradiance += light_here * seen * mix(on_iris, on_white, limbus);
-        specular += seen * schlick(f0, max(dot(n, v), 0.02)) * lamp_mirrored(k, world, reflect(-v, n), 0.03);
+        float on_iris = through_cornea(qn, l * frame);
+        float on_white = smoothstep(-0.25, 1.0, dot(n, l));  // light wraps: the sclera scatters
+        irradiance += light_here * seen * mix(on_iris, on_white, max(white, tissue));
+        specular += seen * mirror * lamp_mirrored(k, world, r, mix(SMOOTH.x, SMOOTH.y, max(white, tissue)));
     }
-    vec3 r_dir = reflect(-v, n);
-    float nv = max(dot(n, v), 0.02);
-    specular += environment(r_dir, 400.0) * schlick(f0, nv) * smoothstep(0.05, 0.45, open_sky);
-    // the tear film thickens where the lids meet the eye
-    float lid = smoothstep(0.62, 0.15, open_sky);
-    specular *= 1.0 - 0.6 * lid;
-    irradiance *= mix(1.0, 0.55, lid);
+    irradiance *= shade;
+    // what is around, mirrored; the upper lid and its lashes stand before it
+    float free = smoothstep(0.02, 0.35, open_sky) * smoothstep(-0.3, 1.6, edge.x) * mix(1.0, 0.6, tissue);
+    specular += environment(r, 1500.0) * mirror * free;
     out_irradiance = vec4(irradiance, 0.0);
     out_specular = vec4(specular, 1.0);
     out_albedo = vec4(albedo, 1.0);

@@ -85,7 +85,9 @@ Program = Callable[..., gl.Program]
 
 @dataclass
 class Drawn:
-    """A surface or an eye on the graphics card. id: of the scattering material, 0 for none."""
+    """A surface or an eye on the graphics card. id: of the scattering material, 0 for none; gaze
+    (3,): of an eye, in its head's axes, None before the first picture.
+    """
 
     item: Item
     mesh: gl.Mesh
@@ -93,6 +95,7 @@ class Drawn:
     id: int = 0
     maps: dict[str, gl.Texture] | None = None
     lists: SurfaceLists | None = None
+    gaze: np.ndarray | None = None
 
 
 class Surfaces:
@@ -109,7 +112,10 @@ class Surfaces:
         height, width = table.shape[:2]
         self.face = gl.Texture(width, height, GL.GL_RGBA32F, linear=True, data=table)
         items = [*contents.surfaces, *contents.eyes]
-        bodies = [body(item) for item in items]
+        eyes_of: dict[int, list[Item]] = {}
+        for item in contents.eyes:
+            eyes_of.setdefault(item.mesh, []).append(item)
+        bodies = [body(item, eyes_of.get(item.mesh, ())) for item in items]
         baked = _baked(bodies, lights, surroundings, rays, seed) if bodies else []
         self.media: list[str | dict] = []
         self._skin_tables: dict[spectral.Layers, gl.Texture] = {}
@@ -119,6 +125,7 @@ class Surfaces:
         ]
         eyes = baked[len(contents.surfaces) :]
         self.eyes = [_eye(item, b) for item, b in zip(contents.eyes, eyes, strict=True)]
+        self._no_edges = gl.Texture(1, 1, GL.GL_RG16F)
 
     def _surface(self, item: Item, baked: Baked) -> Drawn:
         part = item.primitive
@@ -202,21 +209,45 @@ class Surfaces:
             return
         program = programs("passes/eye.frag", defines, vertex="passes/surface.vert")
         for drawn in self.eyes:
-            eye, pose = drawn.item.primitive.eye, drawn.item.pose
-            size = np.linalg.norm(pose[:3, 0])
-            own = {
-                "model": pose,
-                "centre": pose[:3, :3] @ eye.centre + pose[:3, 3],
-                "gaze": pose[:3, :3] @ eye.gaze / size,
-                "radius": eye.radius * size,
-                "iris_radius": eye.iris_radius * size,
-                "iris_base": eye.colours["iris"],
-                "iris_fibres": eye.colours["fibres"],
-                "iris_collarette": eye.colours["collarette"],
-                "sclera_colour": eye.colours["sclera"],
-            }
+            own = self._eye_values(drawn)
             program.use(**program.accepts({**values, **own}))
             drawn.mesh.draw()
+
+    def look(self, lens: np.ndarray) -> None:
+        """Turn the eyes that look into the lens, at (3,) mm in the world, towards it."""
+        for drawn in self.eyes:
+            eye, pose = drawn.item.primitive.eye, drawn.item.pose
+            size = np.linalg.norm(pose[:3, 0])
+            gaze = eye.towards((lens - pose[:3, 3]) @ pose[:3, :3] / size**2)
+            if drawn.gaze is None or not np.array_equal(gaze, drawn.gaze):
+                drawn.mesh.delete()
+                drawn.mesh = _eye_mesh(drawn.item.primitive, drawn.baked, eye.looking(gaze))
+                drawn.gaze = gaze
+
+    def _eye_values(self, drawn: Drawn) -> dict:
+        """The uniforms of an eye."""
+        eye, pose = drawn.item.primitive.eye, drawn.item.pose
+        size = float(np.linalg.norm(pose[:3, 0]))
+        gaze = eye.gaze if drawn.gaze is None else drawn.gaze
+        rng = np.random.default_rng([self.seed, 3])
+        return {
+            "model": pose,
+            "centre": pose[:3, :3] @ eye.centre + pose[:3, 3],
+            "gaze": pose[:3, :3] @ gaze / size,
+            "size": size,
+            "radius": eye.radius,
+            "iris_radius": eye.iris_radius,
+            "iris_base": eye.colours["iris"],
+            "iris_fibres": eye.colours["fibres"],
+            "iris_collarette": eye.colours["collarette"],
+            "sclera_colour": eye.colours["sclera"],
+            **eye.values,
+            "has_edges": int(eye.edges.size > 2),
+            "edges_mm": eye.edges_mm,
+            "vessels_rad": eye.VESSELS_RAD,
+            "noise_origin": rng.uniform(100, 900, 3),
+            **drawn.maps,
+        }
 
     def draw_transmitted(
         self,
@@ -262,6 +293,22 @@ class Surfaces:
             "thickness_scale": translucency.thickness_scale,
             "transmission_wrap": translucency.wrap,
             "transmission_thickness": THICKNESS.index(translucency.thickness),
+        }
+
+    def _lids(self, drawn: Drawn) -> dict:
+        """The uniforms of passes/lids.glsl: the lids of a surface before the eyes of its mesh."""
+        eyes = [eye for eye in self.eyes if eye.item.mesh == drawn.item.mesh][:2]
+        eyes = [eye for eye in eyes if eye.item.primitive.eye.edges.size > 2]
+        shapes = [eye.item.primitive.eye for eye in eyes]
+        balls = [[*shape.centre, shape.radius] for shape in shapes]
+        textures = [eye.maps["edges"] for eye in eyes if eye.maps]
+        textures += [self._no_edges] * (2 - len(textures))
+        return {
+            "lid_count": len(eyes),
+            "lid_ball": np.array(balls + [[0.0, 0.0, 0.0, 1.0]] * (2 - len(balls))),
+            "edges_a": textures[0],
+            "edges_b": textures[1],
+            "edges_mm": shapes[0].edges_mm if shapes else (1.0, 1.0),
         }
 
     def _material(self, drawn: Drawn) -> dict:
@@ -314,6 +361,9 @@ class Surfaces:
             "lid_lines_period": skin.lid_lines_period_mm,
             "wrinkles_behind": skin.wrinkles_behind_mm,
             "lip_folds": skin.lip_folds,
+            "lid_margin": skin.lid_margin,
+            "lash_line": skin.lash_line,
+            **self._lids(drawn),
             **(_local(material) if isinstance(material, Shading) else {}),
         }
 
@@ -394,12 +444,24 @@ def _attributes(part, masks, light, openness, scatters) -> dict[int, np.ndarray]
 
 def _eye(item: Item, baked: Baked) -> Drawn:
     part = item.primitive
+    height, width = part.eye.edges.shape[:2]
+    edges = gl.Texture(width, height, GL.GL_RG16F, linear=True, data=part.eye.edges)
+    grey = np.repeat(part.eye.vessels[..., None], 4, axis=2)
+    side = len(grey)
+    vessels = gl.Texture(side, side, GL.GL_RGBA8, linear=True, mipmap=True, data=grey)
+    mesh = _eye_mesh(part, baked, (part.positions, part.normals))
+    return Drawn(item, mesh, baked, maps={"edges": edges, "vessels": vessels})
+
+
+def _eye_mesh(part, baked: Baked, shape: tuple[np.ndarray, np.ndarray]) -> gl.Mesh:
+    """An eye of positions and normals (N, 3)."""
     count = len(part.positions)
-    flat = baked.light.reshape(-1, 9)
-    attributes = _attributes(
-        part, np.zeros((count, len(MASKS))), flat, baked.openness[:, None], np.zeros(count)
-    )
-    return Drawn(item, gl.Mesh(attributes, part.faces), baked)
+    masks = np.zeros((count, len(MASKS)))
+    masks[:, :2] = part.eye.tissue
+    light, openness = baked.light.reshape(-1, 9), baked.openness[:, None]
+    attributes = _attributes(part, masks, light, openness, np.zeros(count))
+    attributes[0], attributes[1] = shape
+    return gl.Mesh(attributes, part.faces)
 
 
 def _map(image: np.ndarray | None) -> gl.Texture:

@@ -187,6 +187,10 @@ class Skin(Material):
         0.006, unit="share of blood more", low=0.0, high=0.3, source="by eye"
     )
     eyelid_epidermis: float = parameter(0.55, source="of the epidermis, by eye", low=0.1, high=1.0)
+    lid_margin: tuple[float, float, float] = parameter(
+        (0.54, 0.30, 0.27), source="albedo of the wet rim of lids, by eye", **_SHARE
+    )
+    lash_line: float = parameter(0.22, source="of light, along the lashes' roots, by eye", **_SHARE)
     lip_blood: tuple[float, float] = parameter(
         (0.034, 0.080), unit="share of blood: border, seam", low=0.0, high=0.3, source="by eye"
     )

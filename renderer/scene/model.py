@@ -6,9 +6,11 @@ Lengths are millimetres, y is up, the head looks along +z, the crown is at y = 0
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
+from renderer.scene import cornea
 from renderer.scene.material import MASKS, Material, Skin
 
 __all__ = ["MASKS", "Eye", "Model", "Proxy", "Strands", "Surface"]
@@ -65,12 +67,31 @@ class Proxy:
         return cls(at, towards, faces, albedo, to_full, smooth=smooth)
 
 
+#: Sizes and strengths of an eye: fields of stimuli.heads.person.Eyes by the same names.
+EYE_VALUES = (
+    "pupil_mm",
+    "limbus_mm",
+    "limbus",
+    "veins",
+    "redness",
+    "lid_shade",
+    "lid_shade_mm",
+    "meniscus_mm",
+)
+
+
 @dataclass(frozen=True)
 class Eye:
-    """An eyeball with its cornea.
+    """An eyeball with its cornea, and the tissue in the opening's inner corner.
 
-    positions, normals (N, 3), faces (M, 3); centre, gaze (3,), radius, iris_radius mm; colours:
-    linear albedo of iris, fibres, collarette and sclera.
+    positions, normals (N, 3), faces (M, 3); tissue (N, 2): 1 where a vertex is not the ball's but
+    the corner's, and how much of that is caruncle. centre, gaze (3,), radius, iris_radius mm;
+    into_lens: whether it looks at the camera, as far as gaze_limit_deg from straight ahead, or
+    along `gaze`. colours: linear albedo of iris, fibres, collarette and sclera; values: EYE_VALUES.
+    edges (H, W, 2) float32: distance to the upper and to the lower lid's edge, mm, above 0 where
+    the ball is seen, over edges_mm (width, height) about the centre, seen from the front, row 0 at
+    the bottom; (1, 1, 2) where there are no lids. vessels (K, K) uint8: strength of the vessels of
+    the sclera over angles of up to VESSELS_RAD from the gaze, row 0 at the bottom.
     """
 
     positions: np.ndarray
@@ -81,6 +102,33 @@ class Eye:
     radius: float
     iris_radius: float
     colours: dict[str, tuple[float, float, float]]
+    values: dict[str, float]
+    tissue: np.ndarray
+    edges: np.ndarray
+    edges_mm: tuple[float, float]
+    vessels: np.ndarray
+    into_lens: bool = False
+    gaze_limit_deg: float = 35.0
+
+    VESSELS_RAD: ClassVar[float] = 1.75
+
+    def towards(self, lens: np.ndarray) -> np.ndarray:
+        """The gaze, a unit vector (3,), with the lens at (3,)."""
+        away = np.asarray(lens, float) - self.centre
+        away /= np.linalg.norm(away)
+        within = away[2] >= np.cos(np.radians(self.gaze_limit_deg))
+        return away if self.into_lens and within else np.asarray(self.gaze, float)
+
+    def looking(self, gaze: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """positions, normals (N, 3) float32 with the cornea turned to a unit gaze (3,)."""
+        positions, normals = self.positions.copy(), self.normals.copy()
+        ball = self.tissue[:, 0] == 0
+        unit = (positions[ball] - self.centre).astype(float)
+        unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+        away = cornea.reach(unit @ gaze, self.radius, self.iris_radius)
+        positions[ball] = self.centre + away[:, None] * unit
+        normals[ball] = cornea.normals(unit, gaze, self.radius, self.iris_radius)
+        return positions, normals
 
 
 @dataclass(frozen=True)

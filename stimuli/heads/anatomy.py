@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from stimuli.heads import mouth, mpfb, relief, subdivide
+from stimuli.heads import lids, mouth, mpfb, relief, subdivide
+from stimuli.heads.lids import Eyeball, Opening
 from stimuli.heads.person import Person
 
 LEVELS = 2
@@ -37,17 +38,9 @@ class Bust:
 
 
 @dataclass(frozen=True)
-class Eyeball:
-    """Centre (3,) and radius, mm."""
-
-    centre: np.ndarray
-    radius: float
-
-
-@dataclass(frozen=True)
 class Anatomy:
     """What the generators of skin, hair and eyes need: the fine bust, a coarse one of some of its
-    vertices, eyes, lash curves.
+    vertices, eyes and the openings before them.
 
     fine has a third level of subdivision where the form wants it. curves: the folds and rises of
     the form, on the skin before they moved it.
@@ -58,7 +51,7 @@ class Anatomy:
     to_fine: object  # sparse (N_fine, N_coarse)
     eyes: tuple[Eyeball, Eyeball]  # left of the person (x > 0), right
     landmarks: dict[str, np.ndarray]
-    lashes: dict[str, np.ndarray]  # helper name -> (K, 3) points
+    openings: tuple[Opening | None, ...]  # between the lids of each eye
     curves: list[relief.Curve]
 
 
@@ -99,7 +92,7 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     crown = shaped[base.quads.ravel(), 1].max()
     origin = np.array([0.5 * (eyes[0].centre[0] + eyes[1].centre[0]), crown, 0.0])
     shaped = shaped - origin
-    balls = tuple(Eyeball(ball.centre - origin, ball.radius) for ball in eyes)
+    balls = [Eyeball(ball.centre - origin, ball.radius) for ball in eyes]
 
     keep = (shaped[base.quads, 1] > -CROP_BELOW_CROWN_MM).any(axis=1)
     used, quads = np.unique(base.quads[keep], return_inverse=True)
@@ -143,13 +136,13 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     moved += mouth.ridge(
         points, normals, faces, masks["lips"], form.lip_ridge_mm, form.lip_ridge_width_mm
     )
-    points = points + moved
+    points, (left, right), openings = lids.fitted(points + moved, faces, balls, person.eyes)
+    balls = (left, right)
     normals = subdivide.vertex_normals(points, faces)
     fine = Bust(points, normals, faces, uvs, uv_faces, masks)
 
-    lashes = {name: shaped[index] for name, index in base.groups.items() if "eyelashes" in name}
     coarse, to_fine = _coarse(fine, before, smooth, fine_map, close, count)
-    return Anatomy(fine, coarse, to_fine, balls, _landmarks(fine, balls), lashes, made)
+    return Anatomy(fine, coarse, to_fine, balls, _landmarks(fine, balls), tuple(openings), made)
 
 
 def _coarse(fine: Bust, quads, smooth, fine_map, close, count: int) -> tuple[Bust, object]:

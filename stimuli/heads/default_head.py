@@ -55,8 +55,11 @@ def default_model(
     landmarks = dict(anatomy.landmarks, eye_l=anatomy.eyes[0].centre, eye_r=anatomy.eyes[1].centre)
     return Model(
         surface,
-        tuple(eyes.eyeball(ball, person.eyes) for ball in anatomy.eyes),
-        hair.all_strands(anatomy, scalp, seed, hair_share, person.hair),
+        tuple(
+            eyes.eyeball(ball, person.eyes, opening, seed)
+            for ball, opening in zip(anatomy.eyes, anatomy.openings, strict=True)
+        ),
+        hair.all_strands(anatomy, scalp, seed, hair_share, person.hair, person.lashes),
         landmarks,
         own,
     )

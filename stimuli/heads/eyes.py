@@ -1,60 +1,116 @@
-"""Eyeballs: a sphere with the cornea's steeper cap, turned to the gaze."""
+"""Eyeballs: a sphere with the cornea's steeper cap, and the tissue in the opening's inner corner.
+
+The caruncle is a lump of skin in the lake of tears, the plica semilunaris the fold between it and
+the ball; here a sheet that is spanned between the lids and dives under the ball.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from renderer.scene import Eye
-from stimuli.heads.anatomy import Eyeball
+from renderer.scene.cornea import normals, reach
+from renderer.scene.model import EYE_VALUES
+from stimuli.heads.lids import MAP_MM, Eyeball, Opening
 from stimuli.heads.person import Eyes
 from stimuli.heads.subdivide import vertex_normals
+from stimuli.heads.vessels import vessel_map
 
-CORNEA_RADIUS_MM = 7.8  # of curvature; Gullstrand's schematic eye
-LID_CONTACT_MM = (
-    0.3  # the ball is that much larger than the base mesh's, so that the lids lie on it
-)
 RINGS, SEGMENTS = 96, 96
+ACROSS, UP = 44, 30  # vertices of the sheet in the corner
+COLOURS = ("iris", "fibres", "collarette", "sclera")
 
 
-def eyeball(ball: Eyeball, own: Eyes | None = None) -> Eye:
-    """An eye of SEGMENTS x RINGS vertices; rings crowd towards the cornea."""
+def values_of(own: Eyes) -> dict[str, float]:
+    """What the eye's shader takes of a person's fields."""
+    return {name: float(getattr(own, name)) for name in EYE_VALUES}
+
+
+def eyeball(
+    ball: Eyeball, own: Eyes | None = None, opening: Opening | None = None, seed: int = 0
+) -> Eye:
+    """An eye before an opening, or behind none; seed: of its vessels. Rings crowd to the front."""
     own = own or Eyes()
-    radius, iris = ball.radius + LID_CONTACT_MM, own.iris_mm
-    plane = np.sqrt(radius**2 - iris**2)
-    cap = plane - np.sqrt(CORNEA_RADIUS_MM**2 - iris**2)
+    gaze = own.direction
     theta = np.pi * np.linspace(0, 1, RINGS) ** 1.5 * 0.999 + 1e-4
     phi = 2 * np.pi * np.arange(SEGMENTS) / SEGMENTS
-    # distance from the centre along a ray at angle theta: the sphere, or the cornea's sphere about
-    # (0, 0, cap)
-    cosine = np.cos(theta)
-    bulge = cap * cosine + np.sqrt(np.maximum(CORNEA_RADIUS_MM**2 - (cap * np.sin(theta)) ** 2, 0))
-    limbus = np.arcsin(iris / radius)
-    blend = 1 / (1 + np.exp((theta - limbus) / 0.02))
-    r = radius + np.maximum(bulge - radius, 0) * blend
-    local = np.stack(
+    unit = np.stack(
         [
-            np.outer(np.sin(theta) * r, np.cos(phi)),
-            np.outer(np.sin(theta) * r, np.sin(phi)),
-            np.outer(cosine * r, np.ones(SEGMENTS)),
+            np.outer(np.sin(theta), np.cos(phi)),
+            np.outer(np.sin(theta), np.sin(phi)),
+            np.outer(np.cos(theta), np.ones(SEGMENTS)),
         ],
         axis=2,
     ).reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(RINGS - 1), np.arange(SEGMENTS), indexing="ij")
-    a, b = i * SEGMENTS + j, i * SEGMENTS + (j + 1) % SEGMENTS
-    c, d = a + SEGMENTS, b + SEGMENTS
-    faces = np.concatenate(
-        [np.stack([a, c, b], axis=2).reshape(-1, 3), np.stack([b, c, d], axis=2).reshape(-1, 3)]
-    )
-    y = np.radians(own.gaze_yaw_deg)
-    turn = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
-    positions = local @ turn.T + ball.centre
+    positions = ball.centre + reach(unit @ gaze, ball.radius, own.iris_mm)[:, None] * unit
+    normal = normals(unit, gaze, ball.radius, own.iris_mm)
+    faces = _grid(RINGS, SEGMENTS, True)
+    tissue = np.zeros((len(positions), 2))
+    if opening is not None and own.caruncle:
+        more, lumpy = corner(ball, opening, own)
+        sheet = _grid(ACROSS, UP, False)
+        if ball.centre[0] < 0:
+            sheet = sheet[:, ::-1]
+        faces = np.vstack([faces, sheet + len(positions)])
+        positions = np.vstack([positions, more])
+        normal = np.vstack([normal, vertex_normals(more, sheet)])
+        tissue = np.vstack([tissue, np.column_stack([np.ones(len(more)), lumpy])])
     return Eye(
         positions.astype(np.float32),
-        vertex_normals(positions, faces).astype(np.float32),
+        normal.astype(np.float32),
         faces.astype(np.uint32),
-        ball.centre,
-        turn @ np.array([0.0, 0.0, 1.0]),
-        radius,
-        iris,
-        {name: getattr(own, name) for name in ("iris", "fibres", "collarette", "sclera")},
+        np.asarray(ball.centre, float),
+        gaze,
+        float(ball.radius),
+        own.iris_mm,
+        {name: getattr(own, name) for name in COLOURS},
+        values_of(own),
+        tissue.astype(np.float32),
+        np.zeros((1, 1, 2), np.float32) if opening is None else opening.edge_map(),
+        MAP_MM,
+        vessel_map(seed, own.iris_mm / ball.radius, ball.centre[0] > 0),
+        own.gaze == "lens",
     )
+
+
+def _grid(rows: int, columns: int, closed: bool) -> np.ndarray:
+    """Triangles (M, 3) of rows x columns vertices, rows joined to rings where closed."""
+    i, j = np.meshgrid(
+        np.arange(rows - 1), np.arange(columns if closed else columns - 1), indexing="ij"
+    )
+    a, b = i * columns + j, i * columns + (j + 1) % columns
+    c, d = a + columns, b + columns
+    return np.concatenate(
+        [np.stack([a, c, b], axis=2).reshape(-1, 3), np.stack([b, c, d], axis=2).reshape(-1, 3)]
+    )
+
+
+def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.ndarray]:
+    """The sheet in the inner corner: points (ACROSS UP, 3) mm, how much of each is caruncle."""
+    side = 1.0 if ball.centre[0] > 0 else -1.0
+    x_in = side * (opening.x[0] if side > 0 else opening.x[-1])  # the inner corner, below 0
+    deep = opening.corners[0 if side > 0 else 1]
+    # from behind the corner to where it is well inside the ball
+    x = np.linspace(x_in - 0.8, x_in + 0.50 * ball.radius, ACROSS)
+    low, high = opening.at(side * x)
+    v = np.linspace(0, 1, UP)
+    y = (low - 1.3)[:, None] + v[None] * (high - low + 2.6)[:, None]
+    x = np.repeat(x[:, None], UP, axis=1)
+    along = (x - x_in) / ball.radius
+    z = deep - 1.2 - 0.27 * ball.radius * along
+    middle = np.interp(x_in, side * opening.x[:: int(side)], opening.lower[:: int(side)])
+    size = 1.0 * own.caruncle
+    # the caruncle, lumpy
+    dx, dy = (x - x_in - 2.1 * size) / (1.75 * size), (y - middle - 0.15) / (1.15 * size)
+    lump = np.exp(-(dx**2 + dy**2))
+    bumps = (
+        1 + 0.22 * np.sin(3.1 * x + 1.0) * np.sin(3.9 * y + 0.6) + 0.1 * np.sin(6.3 * x - 5.1 * y)
+    )
+    z = z + 1.15 * size * lump * bumps
+    # the fold, a crescent about the ball; it ends where the sphere rises above the sheet
+    flat = np.sqrt(np.maximum(ball.radius**2 - y**2, 0))
+    front = np.sqrt(np.maximum(flat**2 - x**2, 0))
+    above = z - front
+    z = z + 0.5 * size * np.exp(-((above - 0.5) ** 2) / 0.30)
+    local = np.stack([side * x, y, z], axis=2).reshape(-1, 3)
+    return ball.centre + local, np.clip(1.2 * lump, 0, 1).ravel()

@@ -13,7 +13,7 @@ from renderer.scene import MASKS, Strands
 from renderer.scene.shapes import points_on, triangle_areas
 from stimuli.heads import lashes
 from stimuli.heads.anatomy import Anatomy
-from stimuli.heads.person import Hair
+from stimuli.heads.person import Hair, Lashes
 from stimuli.heads.skin import azimuth, smoothstep
 
 POINTS = 7
@@ -296,17 +296,22 @@ def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int,
 
 
 def all_strands(
-    anatomy: Anatomy, scalp: Scalp, seed: int, share: float = 1.0, own: Hair | None = None
+    anatomy: Anatomy,
+    scalp: Scalp,
+    seed: int,
+    share: float = 1.0,
+    own: Hair | None = None,
+    lash: Lashes | None = None,
 ) -> Strands:
     """Every strand of the head; share scales the numbers (tests use few)."""
-    own = own or Hair()
+    own, lash = own or Hair(), lash or Lashes()
     rng = np.random.default_rng([seed, 11])
     eyes = anatomy.landmarks["eyes"]
     balls = [ball.centre for ball in anatomy.eyes]
     parts = [
         scalp_hair(scalp, eyes, rng, int(own.scalp * share), own),
         *brows(scalp, balls, rng, int(own.brows * share), own),
-        *(lashes.grown(anatomy, scalp.positions, rng, own) if own.lashes else ()),
+        *lashes.grown(anatomy, scalp.positions, scalp.faces, rng, lash, own, POINTS),
         stubble(scalp, rng, int(own.stubble * share), own),
         vellus(scalp, eyes, rng, int(own.vellus * share), own),
     ]

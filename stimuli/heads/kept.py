@@ -11,11 +11,13 @@ from renderer.scene.material import Skin
 from stimuli import sources
 from stimuli.heads import anatomy, fetch
 from stimuli.heads.default_head import default_model
+from stimuli.heads.eyes import COLOURS, values_of
 from stimuli.heads.person import Person
 
 SURFACE = ("positions", "normals", "uvs", "faces", "masks")
 PROXY = ("positions", "normals", "faces", "albedo", "masks")
 EYE = ("positions", "normals", "faces", "centre", "gaze", "radius", "iris_radius")
+EYE += ("tissue", "edges", "edges_mm", "vessels")
 STRANDS = ("points", "width_mm", "colour", "cover", "root_vertex")
 SPARSE = ("data", "indices", "indptr", "shape")
 
@@ -53,14 +55,17 @@ def model_of(arrays: caches.Arrays, person: Person) -> Model:
 
     matrix = named("to_full_")
     to_full = sparse.csr_matrix(tuple(matrix[name] for name in SPARSE[:3]), tuple(matrix["shape"]))
-    colours = {
-        name: getattr(person.eyes, name) for name in ("iris", "fibres", "collarette", "sclera")
+    shading = {
+        "colours": {name: getattr(person.eyes, name) for name in COLOURS},
+        "values": values_of(person.eyes),
+        "into_lens": person.eyes.gaze == "lens",
     }
     eyes = []
     for k in range(2):
         own = named(f"eye{k}_")
         sizes = {name: float(own[name]) for name in ("radius", "iris_radius")}
-        eyes.append(Eye(**{**own, **sizes}, colours=colours))
+        sizes["edges_mm"] = tuple(float(v) for v in own["edges_mm"])
+        eyes.append(Eye(**{**own, **sizes, **shading}))
     return Model(
         Surface(**named("surface_"), proxy=Proxy(**named("proxy_"), to_full=to_full)),
         tuple(eyes),

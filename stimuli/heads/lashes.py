@@ -1,59 +1,115 @@
-"""Eyelashes: generated strands along the lids' margins."""
+"""Eyelashes: curved hairs in tufts, from the outer rims of the lids' margins."""
 
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 
 from stimuli.heads.anatomy import Anatomy
-from stimuli.heads.person import Hair
+from stimuli.heads.lids import Eyeball, Opening
+from stimuli.heads.person import Hair, Lashes
 
-POINTS = 7
+RIM_MM = 0.75  # of the roots from the edge that lies on the ball, seen from the front
+BARE_MM = 4.6  # from the inner corner: over the lake of tears no lash grows
+DARKER = 0.45  # of the hair's colour
 
 
-def grown(anatomy: Anatomy, skin: np.ndarray, rng: np.random.Generator, own: Hair) -> list[dict]:
-    """Upper and lower lashes along the lid margins, which the base mesh's lash helpers mark."""
-    from scipy.spatial import cKDTree
+def grown(
+    anatomy: Anatomy,
+    skin: np.ndarray,
+    faces: np.ndarray,
+    rng: np.random.Generator,
+    own: Lashes,
+    hair: Hair,
+    points: int,
+) -> list[dict]:
+    """The lashes of both eyes' lids, as stimuli.heads.hair packs strands.
 
-    tree, out = cKDTree(skin), []
-    for name, curve in anatomy.lashes.items():
-        ball = anatomy.eyes[0] if "-l-" in name else anatomy.eyes[1]
-        upper = name.endswith("2")
-        side = np.sign(ball.centre[0])
-        away = np.linalg.norm(curve - ball.centre, axis=1)
-        roots = curve[away < np.quantile(away, 0.35)]
-        fit = [np.polyfit(roots[:, 0] - ball.centre[0], roots[:, k], 3) for k in (1, 2)]
-        low, high = np.quantile(roots[:, 0] - ball.centre[0], [0.04, 0.96])
-        count = 150 if upper else 75
-        x = rng.uniform(low, high, count)
-        at = np.column_stack([ball.centre[0] + x, np.polyval(fit[0], x), np.polyval(fit[1], x)])
-        outward = (at - ball.centre) / np.linalg.norm(at - ball.centre, axis=1, keepdims=True)
-        splay = side * (x * side + 3) / 16.0
-        direction = outward * [1.0, 0.35, 1.0] + np.column_stack(
-            [
-                0.55 * splay + 0.16 * rng.normal(size=count),
-                np.full(count, -0.22 if upper else -0.45),
-                np.zeros(count),
-            ]
-        )
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        length = (
-            own.lashes
-            * (rng.uniform(5.5, 8.5, count) if upper else rng.uniform(3.0, 5.0, count))
-            * (0.75 + 0.25 * (x * side - low) / (high - low))
-        )
-        s = np.linspace(0, 1, POINTS)
-        curl = np.array([0, 1.0 if upper else -0.35, 0.0])
-        points = at[:, None] + length[:, None, None] * (
-            s[None, :, None] * direction[:, None] + (0.62 * s**2)[None, :, None] * curl
-        )
-        points += 0.07 * rng.normal(size=(count, 1, 3)) * length[:, None, None] * s[None, :, None]
-        out.append(
-            {
-                "points": points,
-                "width_mm": np.full(count, 0.060 if upper else 0.045),
-                "colour": np.tile(np.array(own.colour) * 0.7, (count, 1)),
-                "cover": np.full((count, POINTS), 0.2),
-                "root_vertex": tree.query(at)[1],
-            }
-        )
+    skin (N, 3), faces (M, 3): what they stand on; points: of each strand.
+    """
+    colour = np.array(hair.colour) * DARKER if own.colour is None else np.array(own.colour)
+    out = []
+    for ball, opening in zip(anatomy.eyes, anatomy.openings, strict=True):
+        if opening is None:
+            continue
+        near = np.linalg.norm(skin - ball.centre, axis=1) < 2.0 * ball.radius
+        part = faces[near[faces].all(axis=1)]
+        mesh = trimesh.Trimesh(skin, part, process=False, validate=False)
+        for upper, count in ((True, own.upper), (False, own.lower)):
+            if count:
+                out.append(_lid(ball, opening, mesh, upper, count, rng, own, colour, points))
     return out
+
+
+def _roots(
+    ball: Eyeball, opening: Opening, mesh: trimesh.Trimesh, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the skin is met from the front at (x, y) of the ball's frame, and the nearest vertex;
+    places where nothing is met are left out.
+    """
+    start = np.column_stack([x, y, np.full(len(x), 60.0)]) + ball.centre
+    ahead = np.tile([0.0, 0.0, -1.0], (len(x), 1))
+    face = mesh.ray.intersects_first(start, ahead)
+    hit = face >= 0
+    corners, normal = mesh.triangles[face[hit]], mesh.face_normals[face[hit]]
+    deep = ((corners[:, 0] - start[hit]) * normal).sum(axis=1) / -normal[:, 2]
+    at = start[hit] - deep[:, None] * [0.0, 0.0, 1.0]
+    nearest = np.linalg.norm(corners - at[:, None], axis=2).argmin(axis=1)
+    return at, mesh.faces[face[hit]][np.arange(len(at)), nearest]
+
+
+def _lid(
+    ball: Eyeball,
+    opening: Opening,
+    mesh: trimesh.Trimesh,
+    upper: bool,
+    count: int,
+    rng: np.random.Generator,
+    own: Lashes,
+    colour: np.ndarray,
+    points: int,
+) -> dict:
+    side = 1.0 if ball.centre[0] > 0 else -1.0
+    first = side * (opening.x[0] if side > 0 else opening.x[-1]) + BARE_MM
+    last = side * (opening.x[-1] if side > 0 else opening.x[0]) - 0.5
+    # tufts along the lid, evenly with some play; hairs about them
+    tufts = max(1, round(count / own.tufts))
+    place = ((np.arange(tufts) + rng.uniform(0.0, 1.0, tufts)) / tufts) ** 0.85  # denser outwards
+    of = rng.integers(tufts, size=count)
+    spread = rng.normal(size=count) * 0.32
+    along = first + (last - first) * place[of] + spread
+    along = np.clip(along, first, last)
+    u = (along - first) / (last - first)
+    low, high = opening.at(side * along)
+    row = RIM_MM + 0.22 * rng.random(count)
+    y = high + row if upper else low - row
+    at, vertex = _roots(ball, opening, mesh, side * along, y)
+    if len(at) < count:  # the landmarks do not fit this head
+        raise ValueError("a lash's root misses the lid")
+    # a tuft's own length, splay and curl, and a hair's share of them
+    tuft_length, tuft_turn, tuft_curl = rng.normal(size=(3, tufts))
+    scale = 1 + 0.13 * tuft_length[of] + 0.10 * rng.normal(size=count)
+    scale = np.clip(scale, 0.45, 1.4)
+    scale *= np.where(rng.random(count) < 0.12, rng.uniform(0.35, 0.7, count), 1.0)  # still growing
+    shape = (0.55 + 0.45 * np.sin(np.pi * np.clip(0.12 + 0.62 * u, 0, 1))) * (0.85 + 0.25 * u)
+    length = (own.upper_mm if upper else own.lower_mm) * scale * shape
+    # outwards like spokes of the ball, more so towards the temple; tips of a tuft lean together
+    spoke = np.radians(-22 + 62 * u) + np.radians(8.0) * tuft_turn[of]
+    spoke += np.radians(7.0) * rng.normal(size=count) - 0.25 * spread
+    rise = np.radians((-12.0 if upper else -26.0) + 5.0 * rng.normal(size=count))
+    turn = np.radians(62.0 if upper else -34.0) * (own.curl if upper else 1.0)
+    turn = turn * (1 + 0.18 * tuft_curl[of] + 0.10 * rng.normal(size=count))
+    s = np.linspace(0, 1, points)
+    angle = rise[:, None] + turn[:, None] * s[None] ** 0.9
+    flat = np.stack([side * np.sin(spoke), np.zeros(count), np.cos(spoke)], axis=1)
+    step = np.cos(angle)[..., None] * flat[:, None] + np.sin(angle)[..., None] * [0.0, 1.0, 0.0]
+    step *= (length / (points - 1))[:, None, None]
+    grown_out = np.concatenate([np.zeros((count, 1, 3)), np.cumsum(step[:, 1:], axis=1)], axis=1)
+    width = own.width_mm * (1.0 if upper else 0.75) * rng.uniform(0.8, 1.15, count)
+    return {
+        "points": at[:, None] + grown_out,
+        "width_mm": width,
+        "colour": colour * np.exp(0.15 * rng.normal(size=(count, 1))),
+        "cover": np.full((count, points), 0.2),
+        "root_vertex": vertex,
+    }

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+import numpy as np
+
 from renderer.parameters import Parameters, parameter, refuse_unknown, weights
 from stimuli.heads.form import Form
 from stimuli.heads.regions import Regions
@@ -15,19 +17,107 @@ _COLOUR = {"unit": "linear albedo", "low": 0.0, "high": 1.0}
 
 @dataclass(frozen=True)
 class Eyes(Parameters):
-    """Iris and sclera; `iris` is its colour between the fibres."""
+    """Eyes and the lids about them; `iris` is its colour between the fibres.
+
+    gaze: "lens", where each picture's camera is, or "given", by yaw and pitch. Lids are fitted to
+    the given gaze in both cases.
+    """
 
     called: ClassVar[str] = "eyes"
 
-    iris_mm: float = parameter(6.2, unit="mm, radius", low=4.5, high=7.5, source="Gullstrand")
+    radius_mm: float = parameter(
+        12.0, unit="mm", low=10.0, high=14.0, source="Bekerman et al. 2014, 10.1155/2014/503645"
+    )
+    iris_mm: float = parameter(
+        5.9,
+        unit="mm, radius",
+        low=4.5,
+        high=6.5,
+        source="Rufer et al. 2005: 11.71 mm white to white",
+    )
+    pupil_mm: float = parameter(
+        1.6, unit="mm, radius", low=0.5, high=4.0, source="Watson and Yellott 2012, in bright light"
+    )
     iris: tuple[float, float, float] = parameter((0.11, 0.145, 0.135), source="by eye", **_COLOUR)
     fibres: tuple[float, float, float] = parameter((0.20, 0.215, 0.17), source="by eye", **_COLOUR)
     collarette: tuple[float, float, float] = parameter(
         (0.26, 0.16, 0.065), source="by eye", **_COLOUR
     )
-    sclera: tuple[float, float, float] = parameter((0.50, 0.445, 0.415), source="by eye", **_COLOUR)
+    limbus_mm: float = parameter(
+        0.9, unit="mm, width of the dark ring's edge", low=0.1, high=3.0, source="by eye"
+    )
+    limbus: float = parameter(
+        0.5, unit="share of light that the ring takes", low=0.0, high=1.0, source="by eye"
+    )
+    sclera: tuple[float, float, float] = parameter((0.47, 0.405, 0.385), source="by eye", **_COLOUR)
+    veins: float = parameter(1.0, unit="of their strength", low=0.0, high=4.0, source="by eye")
+    redness: float = parameter(
+        1.0, unit="of the corners' redness", low=0.0, high=4.0, source="by eye"
+    )
+    gaze: str = parameter("lens", choices=("lens", "given"), source="portraits look into the lens")
     gaze_yaw_deg: float = parameter(
         17.0, unit="degrees to the person's left", low=-40.0, high=40.0, source="to the camera"
+    )
+    gaze_pitch_deg: float = parameter(
+        0.0, unit="degrees up", low=-25.0, high=25.0, source="straight ahead"
+    )
+    opening_width_mm: float = parameter(
+        25.0, unit="mm", low=18.0, high=34.0, source="adults 28 to 30, on heads as small as these"
+    )
+    opening_height_mm: float = parameter(
+        8.7, unit="mm", low=3.0, high=14.0, source="adults 9 to 11, relaxed less"
+    )
+    almond: float = parameter(
+        0.7, unit="share, over the base mesh's own shape", low=0.0, high=1.0, source="by eye"
+    )
+    lid_thickness: float = parameter(
+        0.55, unit="of the base mesh's 3.3 mm", low=0.3, high=1.5, source="margins of 2 mm"
+    )
+    ball_lift_mm: float = parameter(
+        0.8, unit="mm above the opening's middle", low=-2.0, high=3.0, source="by eye"
+    )
+    lid_shade: float = parameter(
+        0.56, unit="share of light at the upper lid's edge", low=0.0, high=1.0, source="by eye"
+    )
+    lid_shade_mm: float = parameter(
+        2.4, unit="mm, over which it falls by e", low=0.2, high=10.0, source="by eye"
+    )
+    meniscus_mm: float = parameter(
+        0.35, unit="mm, height", low=0.0, high=1.5, source="Mainstone et al. 1996: 0.2 to 0.5 mm"
+    )
+    caruncle: float = parameter(
+        1.0, unit="of 4 mm, 0: none", low=0.0, high=1.6, source="Duke-Elder 1961: 5 by 3 mm"
+    )
+
+    @property
+    def direction(self) -> np.ndarray:
+        """The given gaze, a unit vector (3,)."""
+        yaw, pitch = np.radians(self.gaze_yaw_deg), np.radians(self.gaze_pitch_deg)
+        return np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
+
+
+@dataclass(frozen=True)
+class Lashes(Parameters):
+    """Lashes of one eye, in tufts whose hairs share length, splay and curl; 0 hairs: none."""
+
+    called: ClassVar[str] = "lashes"
+
+    upper: int = parameter(165, unit="hairs", low=0, high=1000, source="Na et al. 2006: 90 to 160")
+    lower: int = parameter(80, unit="hairs", low=0, high=1000, source="Na et al. 2006: 75 to 80")
+    tufts: float = parameter(2.6, unit="hairs a tuft", low=1.0, high=10.0, source="by eye")
+    upper_mm: float = parameter(7.2, unit="mm", low=0.5, high=16.0, source="adults 8 to 12")
+    lower_mm: float = parameter(4.2, unit="mm", low=0.5, high=12.0, source="adults 6 to 8")
+    width_mm: float = parameter(0.072, unit="mm, at the root", low=0.01, high=0.3, source="adults")
+    curl: float = parameter(
+        1.0, unit="of the upper lashes' curve", low=0.0, high=2.5, source="by eye"
+    )
+    colour: tuple[float, float, float] | None = parameter(
+        (None, (0.02, 0.012, 0.008)),
+        optional=True,
+        source="0.45 of the hair's",
+        unit="linear albedo",
+        low=0.0,
+        high=1.0,
     )
 
 
@@ -47,7 +137,6 @@ class Hair(Parameters):
     )
     brows: int = parameter(820, unit="hairs a brow", low=0, high=5000, source="by eye")
     brow_width: float = parameter(1.0, unit="of 4 mm", low=0.2, high=3.0, source="by eye")
-    lashes: float = parameter(1.0, unit="of their length", low=0.0, high=2.0, source="by eye")
     stubble: int = parameter(9000, unit="hairs", low=0, high=100000, source="a day's beard")
     vellus: int = parameter(16000, unit="hairs", low=0, high=200000, source="by eye")
     vellus_colour: tuple[float, float, float] = parameter(
@@ -70,6 +159,7 @@ class Person(Parameters):
     arm_drop_deg: float = parameter(32.0, unit="degrees", low=0.0, high=80.0, source="by eye")
     eyes: Eyes = field(default_factory=Eyes)
     hair: Hair = field(default_factory=Hair)
+    lashes: Lashes = field(default_factory=Lashes)
     regions: Regions = field(default_factory=Regions)
     skin: dict[str, Any] = field(default_factory=dict)
 
@@ -84,6 +174,7 @@ class Person(Parameters):
             arm.arm_drop_deg,
             Eyes.read(table.get("eyes", {}), f"{where}.eyes"),
             Hair.read(table.get("hair", {}), f"{where}.hair"),
+            Lashes.read(table.get("lashes", {}), f"{where}.lashes"),
             Regions.read(table.get("regions", {}), f"{where}.regions"),
             dict(table.get("skin", {})),
         )

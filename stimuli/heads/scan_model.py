@@ -9,8 +9,8 @@ from scipy import sparse
 
 from renderer.scene import MASKS, Material, Model, Proxy, Surface
 from stimuli.heads import eyes, template
-from stimuli.heads.anatomy import Eyeball
 from stimuli.heads.formats import decode_srgb
+from stimuli.heads.lids import Eyeball, opening
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
 CLUSTER_MM = 3.0
@@ -294,7 +294,7 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     )
     return Model(
         surface,
-        tuple(eyes.eyeball(ball) for ball in balls),
+        tuple(eyes.eyeball(ball, None, opening(positions, faces, ball)) for ball in balls),
         None,
         _landmarks(scan, positions, eye_points, balls),
         material=Material(albedo=tuple(float(v) for v in colour)),

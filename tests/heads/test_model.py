@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 
 import renderer
-from renderer.scene import MASKS, Environment
+from renderer.scene import MASKS, Environment, Eye, cornea
 from renderer.scene.graph import SceneGraph
 from stimuli.heads import anatomy as anatomies
-from stimuli.heads import fetch, subdivide
+from stimuli.heads import fetch, lashes, subdivide
 from stimuli.heads.default_head import default_model
-from stimuli.heads.person import Person
+from stimuli.heads.lids import MAP_MM
+from stimuli.heads.person import Hair, Lashes, Person
 from stimuli.heads.scan_model import scan_model
+from stimuli.heads.vessels import vessel_map
 from stimuli.parts import PEOPLE, read_toml
 
 MAN = Person.read(read_toml(PEOPLE / "man.toml"), "man")
@@ -65,7 +67,7 @@ def test_the_default_head_is_an_adult_head_in_millimetres(anatomy):
     apart = np.linalg.norm(anatomy.eyes[0].centre - anatomy.eyes[1].centre)
     assert 54 < apart < 70  # adults: 51 to 77, mean 63 (Dodgson 2004, doi:10.1117/12.529999)
     assert 200 < -mark["chin"][1] < 250  # crown to chin; adult men about 232
-    assert 11 < anatomy.eyes[0].radius < 15.5
+    assert all(ball.radius == MAN.eyes.radius_mm for ball in anatomy.eyes)
     assert (
         mark["nose"][1] > mark["mouth"][1] > mark["chin"][1]
         and mark["ear_l"][0] > 60
@@ -90,10 +92,86 @@ def test_model_parts_fit_together(model):
     roots = np.linalg.norm(strands.points[:, 0] - skin.positions[strands.root_vertex], axis=1)
     assert np.quantile(roots, 0.99) < 8 and strands.cover.min() >= 0 and strands.cover.max() <= 1
     for eye in model.eyes:
-        reach = np.linalg.norm(eye.positions - eye.centre, axis=1)
-        assert (
-            reach.min() >= eye.radius - 1e-3 and 0.8 < reach.max() - eye.radius < 3.0
-        )  # the cornea stands out
+        ball = eye.tissue[:, 0] == 0
+        reach = np.linalg.norm(eye.positions[ball] - eye.centre, axis=1)
+        assert reach.min() >= eye.radius - 1e-3 and 0.8 < reach.max() - eye.radius < 3.0
+        assert 0 < (~ball).sum() < len(ball)  # the cornea stands out, and a corner has its tissue
+
+
+def test_eyes_have_the_size_of_eyes_and_lids_that_fit(anatomy, model):
+    """Adults: Bekerman et al. 2014 (balls of 24 mm), Rufer et al. 2005 (irises of 11.7 mm); the
+    opening is what the person asks for.
+    """
+    own = MAN.eyes
+    for ball, opening, eye in zip(anatomy.eyes, anatomy.openings, model.eyes, strict=True):
+        assert 11.5 < ball.radius < 12.5 and 5.6 < eye.iris_radius <= 5.9
+        assert abs(opening.width_mm - own.opening_width_mm) < 0.5
+        assert abs(opening.height_mm - own.opening_height_mm) < 0.5
+        # the ball is seen to both sides of the iris, less of it above than below
+        lower, upper = opening.at(np.zeros(1))
+        assert 2 < upper[0] < own.iris_mm and -own.iris_mm < lower[0] < -2
+        away = anatomy.fine.positions - ball.centre  # no skin inside the ball or the cornea
+        distance = np.linalg.norm(away, axis=1)
+        front = cornea.reach(away @ own.direction / distance, ball.radius, own.iris_mm)
+        assert (distance > front).all()
+        # the corner's tissue lies behind the lids' corner and reaches the ball
+        sheet = eye.positions[eye.tissue[:, 0] == 1] - ball.centre
+        side = np.sign(ball.centre[0])
+        corner = side * opening.x[0 if side > 0 else -1]
+        assert (side * sheet[:, 0]).min() < corner < (side * sheet[:, 0]).max()
+        assert (np.linalg.norm(sheet, axis=1) < ball.radius).any()
+
+
+def test_edge_maps_are_distances_to_the_lids(anatomy):
+    opening = anatomy.openings[0]
+    edges = opening.edge_map()
+    height, width = edges.shape[:2]
+    x = (np.arange(width) + 0.5) / width * MAP_MM[0] - 0.5 * MAP_MM[0]
+    y = (np.arange(height) + 0.5) / height * MAP_MM[1] - 0.5 * MAP_MM[1]
+    column = np.abs(x).argmin()
+    lower, upper = opening.at(x[column : column + 1])
+    inside = (y > lower) & (y < upper)
+    np.testing.assert_array_equal(edges[:, column, 0] > 0, y < upper)
+    np.testing.assert_array_equal(edges[:, column, 1] > 0, y > lower)
+    assert (edges[inside, column, 0] <= upper - y[inside] + 1e-6).all()
+    assert (np.diff(edges[inside, column, 0]) < 0).all()  # nearer and nearer to the upper lid
+
+
+def test_lashes_stand_on_the_lids_in_tufts(anatomy, model):
+    skin = model.surface
+    own = Lashes(upper=120, lower=50)
+    lids = lashes.grown(
+        anatomy, skin.positions, skin.faces, np.random.default_rng(1), own, Hair(), 7
+    )
+    assert [len(lid["points"]) for lid in lids] == [120, 50, 120, 50]
+    for lid, ball, opening in zip(
+        lids, np.repeat(anatomy.eyes, 2), np.repeat(anatomy.openings, 2), strict=True
+    ):
+        roots = lid["points"][:, 0] - ball.centre
+        lower, upper = opening.at(roots[:, 0])
+        above = np.maximum(roots[:, 1] - upper, lower - roots[:, 1])
+        assert above.min() > 0.6 and above.max() < 1.1 and (roots[:, 2] > 3).all()
+        nearest = skin.positions[lid["root_vertex"]] - ball.centre
+        assert np.linalg.norm(nearest - roots, axis=1).max() < 1.0
+        along = np.linalg.norm(np.diff(lid["points"], axis=1), axis=2).sum(axis=1)
+        assert along.min() > 1 and along.max() < 12
+    (up, down) = lids[:2]
+    assert (up["points"][:, -1, 1] > up["points"][:, 0, 1]).all()
+    assert (down["points"][:, -1, 1] < down["points"][:, 0, 1]).all()
+    none = lashes.grown(anatomy, skin.positions, skin.faces, None, Lashes(0, 0), Hair(), 7)
+    assert none == []
+
+
+def test_vessels_leave_the_cornea_free_and_follow_their_seed():
+    one, again, other = (vessel_map(seed, 5.9 / 12, True) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, again)
+    assert (one != other).any()
+    half = 0.5 * len(one)
+    y, x = np.indices(one.shape) + 0.5 - half
+    angle = np.hypot(x, y) / half * Eye.VESSELS_RAD
+    assert not one[angle < np.arcsin(5.9 / 12)].any()
+    white = (angle > 0.8) & (angle < 1.5)
+    assert 0.03 < (one[white] > 20).mean() < 0.5  # lines, not a surface
 
 
 def test_hair_repeats_for_one_seed_and_changes_with_it(anatomy, model):
@@ -160,7 +238,7 @@ def test_an_uncoloured_scan_gets_eyes_and_loses_cards_and_shells(tmp_path):
     # eyes replaced, shell and cards gone
     assert len(model.surface.positions) == len(skull.vertices)
     assert [round(float(eye.centre[0])) for eye in model.eyes] == [31, -31]
-    assert all(abs(eye.radius - 12.3) < 0.2 for eye in model.eyes)
+    assert all(abs(eye.radius - 12.0) < 0.2 for eye in model.eyes)
     np.testing.assert_allclose(model.landmarks["eyes"], [0, 4, 88], atol=0.5)
 
 

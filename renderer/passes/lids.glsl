@@ -1,0 +1,26 @@
+// The edges of the lids before an eye: distances in mm to the upper (x) and to the lower edge (y), above 0 where the ball is seen, below 0
+// under that lid; seen from the front, over edges_mm about the ball's centre. own: mm from the centre, in the head's axes.
+vec2 to_edges(sampler2D edges, vec2 edges_mm, vec2 own) { return textureLod(edges, own / edges_mm + 0.5, 0.0).rg; }
+// Towards where that distance grows, in the plane of the front.
+vec2 away_from_edge(sampler2D edges, vec2 edges_mm, vec2 own, int which) {
+    vec2 step_mm = vec2(0.25, 0.0);
+    vec2 right = to_edges(edges, edges_mm, own + step_mm), left = to_edges(edges, edges_mm, own - step_mm);
+    vec2 over = to_edges(edges, edges_mm, own + step_mm.yx), below = to_edges(edges, edges_mm, own - step_mm.yx);
+    vec2 d = which == 0 ? vec2(right.x - left.x, over.x - below.x) : vec2(right.y - left.y, over.y - below.y);
+    return d / max(length(d), 1e-4);
+}
+
+// Skin of lids. Distance in mm from the edge that lies on the ball, seen from the front; 99 where no lid is near. local: mm of the object.
+uniform int lid_count; uniform vec4 lid_ball[2];  // centre, radius
+uniform sampler2D edges_a; uniform sampler2D edges_b;
+uniform vec2 edges_mm;
+float from_edge(vec3 local) {
+    for (int k = 0; k < lid_count; ++k) {
+        vec3 own = local - lid_ball[k].xyz;
+        float away = length(own) - lid_ball[k].w;
+        if (away > 4.5 || own.z < 0.0) continue;
+        vec2 edge = k == 0 ? to_edges(edges_a, edges_mm, own.xy) : to_edges(edges_b, edges_mm, own.xy);
+        return -min(edge.x, edge.y);
+    }
+    return 99.0;
+}
