@@ -75,7 +75,9 @@ class Renderer:
             self._programs: dict = {}
             self.surroundings = Surroundings(contents.environment)
             self.surfaces = Surfaces(contents, contents.lights, self.surroundings, rays, seed)
-            base = {drawn.item.mesh: drawn for drawn in self.surfaces.surfaces}
+            base: dict[int, Drawn] = {}  # a mesh's first surface is what its hair stands on
+            for drawn in self.surfaces.surfaces:
+                base.setdefault(drawn.item.mesh, drawn)
             self.hair = [Hair(item, base[item.mesh]) for item in contents.strands]
             points = [self.surfaces.vertices(), *(h.points.reshape(-1, 3) for h in self.hair)]
             everything = np.vstack(points)

@@ -10,7 +10,7 @@ from renderer.scene.lights import (
     SpotLight,
 )
 from renderer.scene.material import Material, Shading, Skin
-from renderer.scene.model import MASKS, Eye, Model, Proxy, Strands, Surface
+from renderer.scene.model import MASKS, Eye, Garment, Model, Proxy, Strands, Surface
 from renderer.scene.picture import Picture
 from renderer.scene.scene import Scene
 
@@ -22,6 +22,7 @@ __all__ = [
     "DistantLight",
     "Environment",
     "Eye",
+    "Garment",
     "Light",
     "Material",
     "Model",

@@ -120,10 +120,13 @@ class SceneGraph(pyrender.Scene):
         self.camera = camera
 
     def add_model(self, model: Model, pose: np.ndarray, name: str | None = None) -> None:
-        """A head or another object: its surface, its eyes, its hair, in one mesh."""
+        """A head or another object: its surface, clothes, eyes and hair, in one mesh."""
         skin = model.surface
         material = SurfaceMaterial(model.material, skin.maps)
         parts: list[pyrender.Primitive] = [SurfacePrimitive(skin, material, model.landmarks)]
+        for garment in model.garments:
+            cloth = SurfaceMaterial(garment.material, garment.surface.maps)
+            parts.append(SurfacePrimitive(garment.surface, cloth, {}))
         parts += [EyePrimitive(eye) for eye in model.eyes]
         if model.strands is not None:
             parts.append(StrandPrimitive(model.strands))

@@ -13,7 +13,7 @@ import numpy as np
 from renderer.scene import cornea
 from renderer.scene.material import MASKS, Material, Skin
 
-__all__ = ["MASKS", "Eye", "Model", "Proxy", "Strands", "Surface"]
+__all__ = ["MASKS", "Eye", "Garment", "Model", "Proxy", "Strands", "Surface"]
 
 
 @dataclass(frozen=True)
@@ -145,6 +145,14 @@ class Strands:
 
 
 @dataclass(frozen=True)
+class Garment:
+    """Cloth over the skin, of a material of its own."""
+
+    surface: Surface
+    material: Material
+
+
+@dataclass(frozen=True)
 class Model:
     """Everything that stands before the camera.
 
@@ -156,3 +164,4 @@ class Model:
     strands: Strands | None
     landmarks: dict[str, np.ndarray]
     material: Material = field(default_factory=Skin)
+    garments: tuple[Garment, ...] = ()

@@ -63,6 +63,7 @@ class Person(Object):
     shape: ClassVar[str] = "person"
 
     person: str = parameter("man", source="stimuli/people")
+    dressed: bool = parameter(False, source="the thesis's people are bare")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from renderer.scene import Model
 from renderer.scene.objects import Scan
@@ -22,11 +22,12 @@ class Head:
     notes: tuple[str, ...] = ()  # what the user should be told, one line each
 
 
-def load_person(name_or_path: str = "man", seed: int = 0) -> Head:
+def load_person(name_or_path: str = "man", seed: int = 0, dressed: bool = True) -> Head:
     """A generated person: one of stimuli/people by name, or a TOML file of one's own.
 
-    seed: of the generated hair. The base data are fetched on first use. Raises
-    stimuli.errors.InputError for a person that cannot be made, and without network and cache.
+    seed: of the generated hair; dressed: in the person's clothes, if any. The base data
+    are fetched on first use. Raises stimuli.errors.InputError for a person that cannot be made, and
+    without network and cache.
     """
     from stimuli.heads import fetch
     from stimuli.heads.kept import person_model
@@ -34,6 +35,8 @@ def load_person(name_or_path: str = "man", seed: int = 0) -> Head:
 
     path = part(name_or_path, PEOPLE, "person")
     person = Person.read(read_toml(path), path.stem)
+    if not dressed:
+        person = replace(person, clothes=replace(person.clothes, kind="none"))
     origin = {
         "person": path.stem,
         "data": f"{fetch.PACKAGE} {fetch.VERSION}",

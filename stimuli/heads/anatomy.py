@@ -26,7 +26,8 @@ class Bust:
     the head.
 
     positions (N, 3); normals (N, 3); faces (F, 3); uvs (T, 2); uv_faces (F, 3); masks name -> (N,)
-    in [0, 1].
+    in [0, 1]; plain (N, 3): where its vertices lie on the base mesh without targets, y above the
+    eyes.
     """
 
     positions: np.ndarray
@@ -35,6 +36,7 @@ class Bust:
     uvs: np.ndarray
     uv_faces: np.ndarray
     masks: dict[str, np.ndarray]
+    plain: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,9 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     base = mpfb.read_base(data)
     plain = mpfb.lower_arms(data, base, base.positions, person.arm_drop_deg) * mpfb.MM_PER_UNIT
     shaped = mpfb.morph(data, base.positions, person.targets)
-    shaped = mpfb.lower_arms(data, base, shaped, person.arm_drop_deg) * mpfb.MM_PER_UNIT
+    shaped = mpfb.lower_arms(data, base, shaped, person.arm_drop_deg)
+    shaped = mpfb.turn_torso(data, base, shaped, person.torso_yaw_deg, person.torso_roll_deg)
+    shaped = shaped * mpfb.MM_PER_UNIT
 
     plain_eyes = [_ball(plain, base, name) for name in EYES]
     eyes = [_ball(shaped, base, name) for name in EYES]
@@ -139,7 +143,8 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     points, (left, right), openings = lids.fitted(points + moved, faces, balls, person.eyes)
     balls = (left, right)
     normals = subdivide.vertex_normals(points, faces)
-    fine = Bust(points, normals, faces, uvs, uv_faces, masks)
+    plain = both[:, 3:] - middle * [0, 1, 0]
+    fine = Bust(points, normals, faces, uvs, uv_faces, masks, plain)
 
     coarse, to_fine = _coarse(fine, before, smooth, fine_map, close, count)
     return Anatomy(fine, coarse, to_fine, balls, _landmarks(fine, balls), tuple(openings), made)
@@ -172,6 +177,7 @@ def _coarse(fine: Bust, quads, smooth, fine_map, close, count: int) -> tuple[Bus
         np.zeros((0, 2)),
         np.zeros((0, 3), int),
         {name: mask[kept] for name, mask in fine.masks.items()},
+        fine.plain[kept],
     )
     return bust, (fine_map @ to_last).tocsr()
 

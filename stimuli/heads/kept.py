@@ -9,7 +9,7 @@ from renderer import caches
 from renderer.scene import Eye, Model, Proxy, Strands, Surface
 from renderer.scene.material import Skin
 from stimuli import sources
-from stimuli.heads import anatomy, fetch
+from stimuli.heads import anatomy, fetch, garment
 from stimuli.heads.default_head import default_model
 from stimuli.heads.eyes import COLOURS, values_of
 from stimuli.heads.person import Person
@@ -42,6 +42,13 @@ def arrays_of(model: Model) -> caches.Arrays:
     arrays |= {f"to_full_{name}": np.asarray(getattr(proxy.to_full, name)) for name in SPARSE}
     arrays |= {f"strands_{name}": getattr(strands, name) for name in STRANDS}
     arrays |= {f"landmark_{name}": place for name, place in model.landmarks.items()}
+    for k, worn in enumerate(model.garments):
+        cloth, own = worn.surface, worn.surface.proxy
+        names = (*SURFACE, "scatters")
+        arrays |= {f"garment{k}_surface_{name}": getattr(cloth, name) for name in names}
+        arrays |= {f"garment{k}_proxy_{name}": getattr(own, name) for name in PROXY[:4]}
+        sparse_ones = {name: np.asarray(getattr(own.to_full, name)) for name in SPARSE}
+        arrays |= {f"garment{k}_to_full_{name}": value for name, value in sparse_ones.items()}
     for k, eye in enumerate(model.eyes):
         arrays |= {f"eye{k}_{name}": np.asarray(getattr(eye, name)) for name in EYE}
     return arrays
@@ -53,8 +60,10 @@ def model_of(arrays: caches.Arrays, person: Person) -> Model:
     def named(prefix: str) -> dict:
         return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
 
-    matrix = named("to_full_")
-    to_full = sparse.csr_matrix(tuple(matrix[name] for name in SPARSE[:3]), tuple(matrix["shape"]))
+    def matrix(prefix: str) -> sparse.csr_matrix:
+        own = named(prefix)
+        return sparse.csr_matrix(tuple(own[name] for name in SPARSE[:3]), tuple(own["shape"]))
+
     shading = {
         "colours": {name: getattr(person.eyes, name) for name in COLOURS},
         "values": values_of(person.eyes),
@@ -66,10 +75,16 @@ def model_of(arrays: caches.Arrays, person: Person) -> Model:
         sizes = {name: float(own[name]) for name in ("radius", "iris_radius")}
         sizes["edges_mm"] = tuple(float(v) for v in own["edges_mm"])
         eyes.append(Eye(**{**own, **sizes, **shading}))
+    garments = []
+    if person.clothes.kind != "none":
+        own = Proxy(**named("garment0_proxy_"), to_full=matrix("garment0_to_full_"))
+        cloth = Surface(**named("garment0_surface_"), proxy=own)
+        garments.append(garment.dressed(cloth, person.clothes))
     return Model(
-        Surface(**named("surface_"), proxy=Proxy(**named("proxy_"), to_full=to_full)),
+        Surface(**named("surface_"), proxy=Proxy(**named("proxy_"), to_full=matrix("to_full_"))),
         tuple(eyes),
         Strands(**named("strands_")),
         named("landmark_"),
         Skin.read(person.skin, "person.skin"),
+        tuple(garments),
     )

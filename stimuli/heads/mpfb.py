@@ -114,6 +114,42 @@ def lower_arms(data: Path, base: Base, positions: np.ndarray, degrees: float) ->
     return result
 
 
+NECK = {"neck03": 0.75, "neck02": 0.5, "neck01": 0.25}  # share of the head's stillness
+
+
+def turn_torso(
+    data: Path, base: Base, positions: np.ndarray, yaw_deg: float, roll_deg: float
+) -> np.ndarray:
+    """Turn the torso below a head that stays: yaw to the person's left about the neck's vertical
+    axis, roll towards their right; the neck's bones share the way by their skinning weights.
+    """
+    if yaw_deg == 0 and roll_deg == 0:
+        return positions
+    rig = data / "rigs" / "standard"
+    weights = json.loads((rig / "weights.default.json").read_text(encoding="utf-8"))["weights"]
+    bones = json.loads((rig / "rig.default.json").read_text(encoding="utf-8"))
+    bones = bones.get("bones", bones)
+    still = np.zeros(len(positions))
+    for name, table in weights.items():
+        above = name
+        while above is not None and above != "head" and above not in NECK:
+            above = bones[above].get("parent") if above in bones else None
+        if above and table:
+            table = np.array(table)
+            np.add.at(still, table[:, 0].astype(int), NECK.get(above, 1.0) * table[:, 1])
+    angle = 1 - np.clip(still, 0, 1)
+    pivot = positions[base.groups[bones["neck01"]["head"]["cube_name"]]].mean(axis=0)
+    p = positions - pivot
+    for axis, degrees in ((1, yaw_deg), (2, roll_deg)):
+        i, j = ((2, 0), (0, 1))[axis - 1]
+        a = np.radians(degrees) * angle
+        turned = p.copy()
+        turned[:, i] = np.cos(a) * p[:, i] - np.sin(a) * p[:, j]
+        turned[:, j] = np.sin(a) * p[:, i] + np.cos(a) * p[:, j]
+        p = turned
+    return p + pivot
+
+
 def mask_images(data: Path) -> dict[str, np.ndarray]:
     """MPFB's UV masks, softened by a texel: name -> (H, W) in [0, 1]."""
     from scipy.ndimage import gaussian_filter

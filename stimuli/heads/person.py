@@ -145,11 +145,42 @@ class Hair(Parameters):
 
 
 @dataclass(frozen=True)
+class Clothes(Parameters):
+    """What a person wears where a scene shows them dressed.
+
+    The neckline is half of a superellipse of `power` (2 round, 1.2 a V) that hangs from
+    NECKLINE_TOP_MM (stimuli/heads/garment.py) below the eyes of the mesh without targets: half_mm
+    to each side, front_mm and back_mm deep. ease_mm lies between skin and cloth at the neckline,
+    loose_mm more far below it. hem_mm wide is its band, thicker by hem_thick_mm; folds_mm: how high
+    the cloth's folds are; weave_mm: a stitch of its knit.
+    """
+
+    called: ClassVar[str] = "clothes"
+
+    kind: str = parameter("shirt", choices=("none", "shirt"), source="by eye")
+    colour: tuple[float, float, float] = parameter((0.018, 0.019, 0.022), source="dark", **_COLOUR)
+    half_mm: float = parameter(72.0, unit="mm", low=50.0, high=130.0, source="by eye")
+    front_mm: float = parameter(50.0, unit="mm", low=15.0, high=160.0, source="by eye")
+    back_mm: float = parameter(14.0, unit="mm", low=5.0, high=120.0, source="by eye")
+    power: float = parameter(2.2, low=1.0, high=6.0, source="by eye")
+    ease_mm: float = parameter(1.3, unit="mm", low=0.8, high=20.0, source="by eye")
+    loose_mm: float = parameter(8.0, unit="mm", low=0.0, high=40.0, source="by eye")
+    hem_mm: float = parameter(16.0, unit="mm", low=3.0, high=40.0, source="a T-shirt's collar")
+    hem_thick_mm: float = parameter(0.7, unit="mm", low=0.2, high=5.0, source="a T-shirt's collar")
+    folds_mm: float = parameter(7.0, unit="mm", low=0.0, high=15.0, source="by eye")
+    weave_mm: float = parameter(0.9, unit="mm", low=0.2, high=10.0, source="of a stitch, by eye")
+    roughness: float = parameter(0.8, unit="Beckmann slope", low=0.05, high=1.0, source="by eye")
+    specular: float = parameter(0.35, low=0.0, high=10.0, source="1 is a smooth face's; by eye")
+
+
+@dataclass(frozen=True)
 class Person(Parameters):
     """A person.
 
-    targets: weight of each of MakeHuman's morph targets, by its path below targets/; skin: what
-    their skin says over renderer.scene.Skin's defaults (read with the scene's materials).
+    targets: weight of each of MakeHuman's morph targets, by its path below targets/; arm_drop_deg:
+    how far the arms hang down; torso_yaw_deg, torso_roll_deg: how far the torso is turned below a
+    head that looks along +z; clothes: worn where a scene shows them dressed; skin: what their skin
+    says over renderer.scene.Skin's defaults (read with the scene's materials).
     """
 
     called: ClassVar[str] = "person"
@@ -157,6 +188,17 @@ class Person(Parameters):
     targets: dict[str, float] = field(default_factory=dict)
     form: Form = field(default_factory=Form)
     arm_drop_deg: float = parameter(32.0, unit="degrees", low=0.0, high=80.0, source="by eye")
+    torso_yaw_deg: float = parameter(
+        0.0,
+        unit="degrees to the person's left, below the head",
+        low=-60.0,
+        high=60.0,
+        source="pose",
+    )
+    torso_roll_deg: float = parameter(
+        0.0, unit="degrees, right shoulder down", low=-20.0, high=20.0, source="pose"
+    )
+    clothes: Clothes = field(default_factory=Clothes)
     eyes: Eyes = field(default_factory=Eyes)
     hair: Hair = field(default_factory=Hair)
     lashes: Lashes = field(default_factory=Lashes)
@@ -167,11 +209,13 @@ class Person(Parameters):
     def read(cls, table: Mapping[str, Any], where: str) -> Person:
         refuse_unknown(table, cls.names(), where)
         targets = weights(f"{where}.targets", table.get("targets", {}), "weights", -1, 1.5)
-        arm = super().read({k: v for k, v in table.items() if k == "arm_drop_deg"}, where)
+        pose = ("arm_drop_deg", "torso_yaw_deg", "torso_roll_deg")
+        posed = super().read({k: v for k, v in table.items() if k in pose}, where)
         return cls(
             targets,
             Form.read(table.get("form", {}), f"{where}.form"),
-            arm.arm_drop_deg,
+            *(getattr(posed, name) for name in pose),
+            Clothes.read(table.get("clothes", {}), f"{where}.clothes"),
             Eyes.read(table.get("eyes", {}), f"{where}.eyes"),
             Hair.read(table.get("hair", {}), f"{where}.hair"),
             Lashes.read(table.get("lashes", {}), f"{where}.lashes"),

@@ -6,9 +6,9 @@ import trimesh
 
 from renderer.errors import InputError
 from stimuli.heads import anatomy as anatomies
-from stimuli.heads import fetch, mouth, subdivide
+from stimuli.heads import fetch, garment, mouth, mpfb, subdivide
 from stimuli.heads.form import PLACES, Form
-from stimuli.heads.person import Person
+from stimuli.heads.person import Clothes, Person
 
 FOLD = {"height_mm": -1.5, "width_mm": 2.2, "bulge_mm": 0.0}
 
@@ -57,6 +57,37 @@ def test_closed_lips_lie_over_each_other(folded):
     front = bust.positions[bust.masks["lips"] > 0.5][:, 2].max()
     depth = 400 - first(bust, gap, np.tile([0.0, 0.0, -1.0], (len(gap), 1)))
     assert depth.min() > front - 18  # a ray between the lips does not pass them
+
+
+def test_a_shirt_lies_over_the_skin_and_hides_what_is_left_out(folded):
+    from scipy.spatial import cKDTree
+
+    own = Clothes()
+    cloth, skin = garment.shirt(folded, own), folded.fine
+    _, near = cKDTree(skin.positions).query(cloth.positions)
+    above = ((cloth.positions - skin.positions[near]) * skin.normals[near]).sum(axis=1)
+    # the band's turned-in edge, which nobody sees, may dip into hollows
+    assert np.quantile(above, 0.01) > 0 and above.min() > -0.8
+    # rays from outside meet the cloth before the skin wherever skin was left out
+    gone = np.setdiff1d(skin.faces, skin.faces[garment.bare(skin, own)])
+    gone = gone[skin.positions[gone, 1] > -450][::7]
+    points, normals = skin.positions[gone], skin.normals[gone]
+    mesh = trimesh.Trimesh(cloth.positions, cloth.faces, process=False, validate=False)
+    rays = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh)
+    assert rays.intersects_any(points + 0.01 * normals, normals).mean() > 0.995
+    assert np.isfinite(cloth.positions).all() and len(cloth.faces) > 20_000
+    np.testing.assert_allclose(np.asarray(cloth.proxy.to_full.sum(axis=1)).ravel(), 1)
+
+
+def test_the_torso_turns_and_the_face_stays():
+    data = fetch.mpfb_data()
+    base = mpfb.read_base(data)
+    turned = mpfb.turn_torso(data, base, base.positions, 20.0, 0.0)
+    eye, wrist = base.groups["helper-l-eye"], base.groups["joint-l-hand"]
+    np.testing.assert_allclose(turned[eye], base.positions[eye], atol=1e-9)
+    before, after = base.positions[wrist].mean(axis=0), turned[wrist].mean(axis=0)
+    pivot = np.linalg.norm(after[[0, 2]]) - np.linalg.norm(before[[0, 2]])
+    assert after[2] < before[2] and abs(pivot) < 0.5 and after[1] == pytest.approx(before[1])
 
 
 def test_both_sides_are_alike_without_asymmetry(folded):
