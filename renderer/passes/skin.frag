@@ -22,7 +22,7 @@ uniform sampler2D skin_table;        // log albedo: columns blood, rows melanin,
 uniform vec2 skin_most; uniform float skin_thinnest; uniform float skin_blocks;
 uniform float melanin; uniform float blood; uniform float flush; uniform float mottling; uniform vec2 uneven;
 uniform float eyelid_blood; uniform float eyelid_epidermis; uniform vec2 lip_blood; uniform float lip_melanin; uniform float lip_epidermis;
-uniform float freckles; uniform float freckle_share; uniform float moles; uniform float mole_share; uniform float vessels;
+uniform float freckles; uniform float freckle_share; uniform float moles; uniform float mole_share; uniform float vessels; uniform float veins;
 uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 inside_colour;
 uniform float pore_darkness; uniform vec2 micro_mm;
 uniform float f0_oily; uniform float roughness_lips; uniform float lobe_share_oily; uniform float oil_patches;
@@ -231,10 +231,22 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, bool mapped, vec3 ma
         float broken = smoothstep(-0.1, 0.5, noise(q / 1.9 + 33.0));
         h += webbed * broken * exp(-pow((v.f2 - v.f1) / 0.055, 2.0));
     }
-    // freckles
+    // veins below temple and neck, where the epidermis lies over little else
+    float vein = 0.0;
+    if (veins * layer_mottling > 0.0 && eye_l != eye_r && !mapped) {
+        vec3 off = p - 0.5 * (eye_l + eye_r);
+        float side = abs(off.x);
+        float there = max(smoothstep(46.0, 56.0, side) * smoothstep(-4.0, 6.0, off.y) * smoothstep(58.0, 36.0, off.y), smoothstep(-108.0, -124.0, off.y));
+        there *= smoothstep(0.0, 0.35, noise(q / 17.0 + 15.0)) * (1.0 - hair);
+        if (there > 0.02) {
+            Cells v = cells((q + vec3(5.0 * patchy, 5.0 * red, 5.0 * broad)) * vec3(1.0, 0.6, 1.0) / 30.0 + 70.0);
+            vein = there * exp(-pow((v.f2 - v.f1) / 0.06, 2.0));
+        }
+    }
+    // freckles, most where the sun falls and blood shows
     Spot c = spot(q / 7.5);
     float one = unit(mix_bits(c.id ^ 3u)), of = unit(mix_bits(c.id ^ 5u));
-    if (one > 1.0 - freckle_share && c.f1 < 0.24)
+    if (one > 1.0 - freckle_share * (0.4 + 1.2 * flushed) && c.f1 < 0.24)
         m += layer_freckles * freckles * (0.4 + 0.6 * of) * ragged(q, c.f1, mix(0.05, 0.13, of), 0.8) * (1.0 - lips);
     m += moles * mole;
     // lips: redder towards the seam, under a thin epidermis
@@ -254,6 +266,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, bool mapped, vec3 ma
     if (mapped) skin = map * skin / skin_colour(m0 / thickness, h0, thickness);
     skin *= mix(vec3(1.0), scalp_left, hair * scalp_tint) * (1.0 - rooted * rooted_left - 0.45 * dots * rooted);
     skin *= 1.0 - pore_darkness * min(pore, 1.0);
+    skin *= 1.0 - veins * layer_mottling * vein * vec3(0.13, 0.06, 0.02);  // red goes deepest, and is missing most (Kienle et al. 1996)
     return mapped ? skin : mix(skin, inside_colour, inside);
 }
 

@@ -63,6 +63,7 @@ SKIN_UNIFORMS = (
     "moles",
     "mole_share",
     "vessels",
+    "veins",
     "micro_mm",
     "f0_oily",
     "roughness_dry",

@@ -24,7 +24,7 @@ _SHARE = {"low": 0.0, "high": 1.0}
 # octaves, of the dots below the surface.
 FRECKLE_AREA, MOTTLING_MEAN, DOTS_MEAN = 0.01, 0.15, 0.10
 # What hair in and over the skin leaves of its colour, and the colour of the mouth's inside.
-SCALP, ROOTED, INSIDE = (0.22, 0.21, 0.21), (0.30, 0.27, 0.24), (0.22, 0.06, 0.06)
+SCALP, ROOTED, INSIDE = (0.22, 0.21, 0.21), (0.36, 0.32, 0.27), (0.22, 0.06, 0.06)
 #: The medium of a skin that follows from its own pigments.
 PERSON = "person"
 
@@ -205,6 +205,13 @@ class Skin(Material):
     vessels: float = parameter(
         0.05, unit="share of blood more", low=0.0, high=0.3, source="fine ones, by eye"
     )
+    veins: float = parameter(
+        1.0,
+        unit="of 13, 6, 2 % less light",
+        low=0.0,
+        high=5.0,
+        source="by eye after Kienle et al. 1996, doi:10.1364/AO.35.001151",
+    )
     beard: float = parameter(1.0, low=0.0, high=1.3, source="tint of shaven skin, by eye")
     scalp: float = parameter(0.9, source="darkening under hair, by eye", **_SHARE)
     pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.066 and 0.030 mm")
@@ -295,6 +302,7 @@ class Skin(Material):
         lips, inner = lip_places(column["lips"])
         eyelid, flushed = column["eyelid"], column["flush"]
         freckles = self.freckles * self.freckle_share * FRECKLE_AREA * (1 - lips)
+        freckles = freckles * (0.4 + 1.2 * flushed)
         melanin = self.melanin * (1 + (self.lip_melanin - 1) * lips) + freckles
         blood = self.blood + self.flush * flushed + self.eyelid_blood * eyelid
         blood = blood + self.mottling * (0.003 + 0.010 * flushed) * MOTTLING_MEAN

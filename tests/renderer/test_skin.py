@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import renderer
+from renderer.errors import InputError
+from renderer.optics import media
 from renderer.optics import skin as spectral
 from renderer.scene.material import Skin
 from stimuli import scenes
@@ -82,3 +84,36 @@ def test_nothing_sparkles():
     still, moved = (shaded(OILY, 48.0, 48, (x, 0.0, 0.0))[0][16:32, 16:32] for x in (0.0, 1 / 3))
     assert still.mean() > 0.01
     assert np.sqrt(((moved - still) ** 2).mean()) < 0.12 * still.mean()
+
+
+def test_a_skin_scatters_in_its_own_layers():
+    """`medium = "person"`: the albedo of the medium is the one that is shown; darker skin lets
+    light less far."""
+    reach = []
+    for melanin in (0.02, 0.3):
+        table = {
+            "objects": {"slab": {"shape": "slab", "size_mm": [24.0, 24.0, 10.0]}},
+            "materials": {"slab": {"kind": "skin", "medium": "person", "melanin": melanin}},
+            "environment": {"ambient": [1.0, 1.0, 1.0]},
+        }
+        scene = scenes.read_scene(table)
+        part = next(iter(scenes.stage(scene).graph.meshes)).primitives[0]
+        walked = media.curve(part.material.value.layered(), photons=20_000)
+        shown = scene.materials["slab"].mean_albedo(part.masks[:1])[0]
+        np.testing.assert_allclose(walked.albedo, shown, rtol=0.05)
+        reach.append(walked.mean_radius())
+    assert (reach[1] < 0.8 * reach[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("material", "words"),
+    [
+        ({"kind": "skin", "thickness": 3.0}, "medium is 'person' with a thickness or coatings"),
+        ({"kind": "plain"}, "medium is 'person'; expected one of skin"),
+    ],
+)
+def test_only_a_whole_skin_has_a_medium_of_its_own(material, words):
+    table = {"objects": {"ball": {"shape": "sphere"}}}
+    with pytest.raises(InputError) as caught:
+        scenes.read_scene({**table, "materials": {"ball": {**material, "medium": "person"}}})
+    assert words in str(caught.value) and "\n" not in str(caught.value)
