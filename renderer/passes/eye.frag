@@ -45,7 +45,6 @@ vec3 iris_colour(vec2 q, float pixel_mm, float seed) {
     c *= mix(1.0, 0.42, smoothstep(0.72, 1.02, t));
     c *= mix(0.35, 1.0, smoothstep(0.0, 0.055, t));
     float edge = max(0.045, 0.7 * pixel_mm);
-    c *= 0.82;
     return c * smoothstep(pupil - edge, pupil + edge, rim + 0.02 * noise(vec3(around * 9.0, 2.0)));
 }
 
@@ -72,8 +71,11 @@ void main() {
 
     // iris, seen through the cornea
     vec3 q = to_iris(p, n * frame, -v * frame);
+    // A diffuse surface below a face of index m: radiance falls by m^2 on its way out, 2 % are lost each way, and of what the face sends
+    // back inside, 45 %, the iris returns its share.
     float seed = floor(noise_origin.x) * 0.37;
     vec3 iris = iris_colour(q.xy, pixel_mm, seed);
+    iris *= 0.96 / (AQUEOUS * AQUEOUS * (1.0 - 0.45 * min(iris, 1.0)));
 
     // sclera: vessels that lie on the ball, more red in the corners and below the lids
     float angle = acos(clamp(p.z / max(length(p), 1e-3), -1.0, 1.0));
@@ -114,6 +116,7 @@ void main() {
     vec3 specular = vec3(0.0), r = reflect(-v, wet_n), qn = vec3(q.xy, iris_z(length(q.xy)));
     if (dot(r, n) < 0.0) r = normalize(r - n * (dot(r, n) - 0.02));
     float nv = max(dot(wet_n, v), 0.02), mirror = schlick(F0, nv);
+    strand_disc_mm = 1.6; strand_share = 0.4;  // lashes are 0.06 mm wide, in the maps 0.16
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world), light_here = lamp_light(k, world);
         float seen = visibility(k, world, n, phase);
@@ -122,9 +125,9 @@ void main() {
         irradiance += light_here * seen * mix(on_iris, on_white, max(white, tissue));
         specular += seen * mirror * lamp_mirrored(k, world, r, mix(SMOOTH.x, SMOOTH.y, max(white, tissue)));
     }
-    irradiance *= shade;
+    irradiance *= shade * (1.0 + 0.5 * tissue);  // light comes to the corner through the lids about it too
     // what is around, mirrored; the upper lid and its lashes stand before it
-    float free = smoothstep(0.02, 0.35, open_sky) * smoothstep(-0.3, 1.6, edge.x) * mix(1.0, 0.6, tissue);
+    float free = smoothstep(0.12, 0.55, open_sky) * smoothstep(-0.3, 1.6, edge.x) * (1.0 - 0.8 * tissue);
     specular += environment(r, 1500.0) * mirror * free;
     out_irradiance = vec4(irradiance, 0.0);
     out_specular = vec4(specular, 1.0);

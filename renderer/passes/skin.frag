@@ -371,7 +371,7 @@ void main() {
     float from = from_edge(local), margin = 1.0 - smoothstep(0.25, 0.70, from);
     if (from < 4.0) {
         albedo *= 1.0 - lash_line * vec3(0.85, 1.0, 1.0) * exp(-pow((from - 1.05) / 0.42, 2.0));
-        albedo = mix(albedo, lid_margin, 0.70 * margin);
+        albedo = mix(albedo, lid_margin, 0.60 * margin);
         m = mix(m, 0.16, margin);
     }
     if (has_roughness_map == 1) m = clamp(map_at(roughness_map, uv).r, 0.12, 0.9);

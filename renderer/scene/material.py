@@ -188,7 +188,7 @@ class Skin(Material):
     )
     eyelid_epidermis: float = parameter(0.55, source="of the epidermis, by eye", low=0.1, high=1.0)
     lid_margin: tuple[float, float, float] = parameter(
-        (0.54, 0.30, 0.27), source="albedo of the wet rim of lids, by eye", **_SHARE
+        (0.49, 0.27, 0.24), source="albedo of the wet rim of lids, by eye", **_SHARE
     )
     lash_line: float = parameter(0.22, source="of light, along the lashes' roots, by eye", **_SHARE)
     lip_blood: tuple[float, float] = parameter(

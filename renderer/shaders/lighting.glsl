@@ -70,6 +70,9 @@ float scale_of(int lamp, int layer, float depth) {  // uv per mm
     return distant(lamp) ? layer_scale[layer] : layer_scale[layer] / max(depth, 1.0);
 }
 
+// Strands are drawn wider into the lamps' maps than they are (renderer/passes/hair.py): how wide a disc of them is averaged, mm, and how much
+// of what they cover is dark. Surfaces under lashes say more.
+float strand_disc_mm = 0.8, strand_share = 1.0;
 // Visibility of a lamp in [0, 1]: percentage-closer soft shadows (Fernando 2005) over a Vogel disc.
 float visibility(int lamp, vec3 p, vec3 n, float phase) {
     if (lamp_layer[lamp] < 0) return 1.0;
@@ -107,10 +110,10 @@ float visibility(int lamp, vec3 p, vec3 n, float phase) {
     float through = 0.0;  // strands: a fixed small disc
     float texel = 1.0 / float(textureSize(strand_depth, 0).x);
     for (int k = 0; k < 12; ++k) {
-        vec2 o = max(0.8 * scale, 1.5 * texel) * vogel(k, 12, phase + 0.4);
+        vec2 o = max(strand_disc_mm * scale, 1.5 * texel) * vogel(k, 12, phase + 0.4);
         through += layer_strands(layer, q.xy + o) < q.z - 0.3 ? 0.0 : 1.0;
     }
-    return lit * through / 12.0;
+    return lit * mix(1.0, through / 12.0, strand_share);
 }
 
 // What a lamp's size adds to the squared Beckmann slope of a mirror that shows it: a disc of the sine t is t/2 of slopes of the half

@@ -11,7 +11,7 @@ from stimuli.heads.person import Hair, Lashes
 
 RIM_MM = 0.75  # of the roots from the edge that lies on the ball, seen from the front
 BARE_MM = 4.6  # from the inner corner: over the lake of tears no lash grows
-DARKER = 0.45  # of the hair's colour
+DARKER = 0.6  # of the hair's colour
 
 
 def grown(

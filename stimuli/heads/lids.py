@@ -24,6 +24,7 @@ BEHIND_MM = 3.0  # so far behind the ball's front a ray has to come for it to ha
 CONTACT = 0.94  # of the base mesh's ball: where its lids' edges lie
 LEAVES = -0.5  # of the radius: there edges leave the ball towards the inner corner
 CORNER_MM = 1.2  # that the inner corner is set back
+EASED_MM, EASED_ROUNDS = 9.0, 40  # about the inner corner, where skin is smoothed, and how often
 CLEAR_MM = 0.05  # of skin from the ball
 LATERAL_MM = 0.5  # of the outer corner from the ball's side
 UPPER_SHARE = 0.62  # of the opening's height, above the line between the corners
@@ -295,6 +296,34 @@ def clear(points: np.ndarray, ball: Eyeball, own: Eyes, gaze: np.ndarray) -> np.
     return result
 
 
+def _eased(points: np.ndarray, faces: np.ndarray, shape: _Shape) -> np.ndarray:
+    """Points (N, 3) with the skin beside and below the inner corner smoothed: folds of the base
+    mesh are pushed together there.
+    """
+    from scipy import sparse
+
+    local = (points - shape.ball.centre) * [shape.side, 1, 1]
+    low, high = shape.goal(local[:, 0])
+    above = np.maximum(local[:, 1] + shape.line - high, low - local[:, 1] - shape.line)
+    away = np.maximum(above, shape.medial - local[:, 0])  # from the opening
+    middle = np.array([shape.medial - 1.5, shape.corners[0] - shape.line - 3.0])
+    share = 1 - _step(3.5, EASED_MM, np.linalg.norm(local[:, :2] - middle, axis=1))
+    share *= _step(1.0, 2.2, away) * (local[:, 2] > 0)
+    own = np.flatnonzero((share[faces] > 0).any(axis=1))
+    used, part = np.unique(faces[own], return_inverse=True)
+    part = part.reshape(-1, 3)
+    i, j = part.ravel(), np.roll(part, 1, axis=1).ravel()
+    ones = np.ones(2 * len(i))
+    link = sparse.csr_matrix((ones, (np.append(i, j), np.append(j, i))), (len(used), len(used)))
+    link = sparse.diags(1 / np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)) @ link
+    moved, weight = points[used].copy(), 0.6 * share[used, None]
+    for _ in range(EASED_ROUNDS):
+        moved += weight * (link @ moved - moved)
+    result = points.copy()
+    result[used] = moved
+    return result
+
+
 def fitted(
     points: np.ndarray, faces: np.ndarray, balls: Sequence[Eyeball], own: Eyes
 ) -> tuple[np.ndarray, list[Eyeball], list[Opening | None]]:
@@ -308,6 +337,7 @@ def fitted(
         measured = opening(points, faces, ball)
         shape = None if measured is None else _Shape(ball, measured, own)
         if shape is not None:
-            points = clear(shape.moved(points), shape.ball, own, own.direction)
+            points = _eased(shape.moved(points), faces, shape)
+            points = clear(points, shape.ball, own, own.direction)
         new.append(ball if shape is None else shape.ball)
     return points, new, [opening(points, faces, ball) for ball in new]

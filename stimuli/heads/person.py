@@ -65,13 +65,13 @@ class Eyes(Parameters):
         25.0, unit="mm", low=18.0, high=34.0, source="adults 28 to 30, on heads as small as these"
     )
     opening_height_mm: float = parameter(
-        8.7, unit="mm", low=3.0, high=14.0, source="adults 9 to 11, relaxed less"
+        8.3, unit="mm", low=3.0, high=14.0, source="adults 9 to 11, relaxed less"
     )
     almond: float = parameter(
         0.7, unit="share, over the base mesh's own shape", low=0.0, high=1.0, source="by eye"
     )
     lid_thickness: float = parameter(
-        0.55, unit="of the base mesh's 3.3 mm", low=0.3, high=1.5, source="margins of 2 mm"
+        0.44, unit="of the base mesh's 3.3 mm", low=0.3, high=1.5, source="by eye; adults 2 mm"
     )
     ball_lift_mm: float = parameter(
         0.8, unit="mm above the opening's middle", low=-2.0, high=3.0, source="by eye"
@@ -105,16 +105,16 @@ class Lashes(Parameters):
     upper: int = parameter(165, unit="hairs", low=0, high=1000, source="Na et al. 2006: 90 to 160")
     lower: int = parameter(80, unit="hairs", low=0, high=1000, source="Na et al. 2006: 75 to 80")
     tufts: float = parameter(2.6, unit="hairs a tuft", low=1.0, high=10.0, source="by eye")
-    upper_mm: float = parameter(7.2, unit="mm", low=0.5, high=16.0, source="adults 8 to 12")
-    lower_mm: float = parameter(4.2, unit="mm", low=0.5, high=12.0, source="adults 6 to 8")
-    width_mm: float = parameter(0.072, unit="mm, at the root", low=0.01, high=0.3, source="adults")
+    upper_mm: float = parameter(6.4, unit="mm", low=0.5, high=16.0, source="adults 8 to 12")
+    lower_mm: float = parameter(3.6, unit="mm", low=0.5, high=12.0, source="adults 6 to 8")
+    width_mm: float = parameter(0.056, unit="mm, at the root", low=0.01, high=0.3, source="adults")
     curl: float = parameter(
         1.0, unit="of the upper lashes' curve", low=0.0, high=2.5, source="by eye"
     )
     colour: tuple[float, float, float] | None = parameter(
         (None, (0.02, 0.012, 0.008)),
         optional=True,
-        source="0.45 of the hair's",
+        source="0.6 of the hair's",
         unit="linear albedo",
         low=0.0,
         high=1.0,
