@@ -45,6 +45,7 @@ def create_app(
     from flask import Flask
 
     from app import dashboard, language, monitoring, questionnaire, researchers, security, web
+    from app.dashboard import live
     from app.database import Database
     from app.hosting import Hosted
     from app.simulation import views as simulation
@@ -62,6 +63,7 @@ def create_app(
     )
     app.extensions["study"] = study
     app.extensions["database"] = database
+    app.extensions["everybody"] = live.Everybody()
     app.extensions["newcomers"] = (
         security.Limiter(enrolments, 600) if enrolments and not simulated else None
     )

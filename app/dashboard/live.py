@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from datetime import datetime, timedelta
 from math import isnan
+from threading import Lock
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -75,6 +76,34 @@ def shared(database: Database, study: Study, period_s: float = PERIOD_S) -> dict
     except IntegrityError:
         pass  # the very first numbers, made twice at once: one is kept
     return made
+
+
+class Everybody:
+    """The rows of `participants` and of `quality`, made in a process once for all its pages about
+    people: anew when something happened since, answers alone no oftener than `shared` would.
+    """
+
+    def __init__(self):
+        self._lock = Lock()
+        self._made: tuple[list[dict[str, Any]], dict[str, Any]] = [], {}
+        self._about, self._at, self._pause_s = "", 0.0, 0.0
+
+    def seen(
+        self, db: Session, study: Study, period_s: float = PERIOD_S, code: str | None = None
+    ) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+        """code: of a participant who must be among them."""
+        with self._lock:
+            about, age_s = _about(db), monotonic() - self._at
+            known = code is None or any(one["code"] == code for one in self._made[0])
+            # what researchers did, the last part, shows at once
+            judged = about.rpartition(".")[2] == self._about.rpartition(".")[2]
+            fresh = about == self._about or (judged and age_s < self._pause_s)
+            if not (self._about and known and fresh and age_s < OLDEST.total_seconds()):
+                began, answers = monotonic(), responses(db, study)
+                self._made = participants(db, study, answers), quality(study, answers)
+                self._about, self._at = about, monotonic()
+                self._pause_s = max(period_s, (self._at - began) / SHARE) if period_s else 0.0
+            return self._made
 
 
 def _about(db: Session) -> str:

@@ -163,7 +163,7 @@ def export_zip():
 def participants_csv():
     """Everybody with their state and the rules that they break."""
     with database().read() as db:
-        people = live.participants(db, study(), live.responses(db, study()))
+        people, _ = _everybody(db)
     body = "".join(export.table_csv(list(people[0]) if people else ["code"], people))
     return download(body, "participants.csv")
 
@@ -172,7 +172,7 @@ def participants_csv():
 def everybody():
     """All of them, on a page that does not update itself."""
     with database().read() as db:
-        people = live.participants(db, study(), live.responses(db, study()))
+        people, _ = _everybody(db)
     return render_template("dashboard/everybody.html", participants=people)
 
 
@@ -181,12 +181,11 @@ def participant(code: str):
     """One person: what they are flagged for, and leaving them out or letting them count again."""
     with database().read() as db:
         someone = _someone(db, code)
-        answers = live.responses(db, study())
-        people = live.participants(db, study(), answers)
+        people, judged = _everybody(db, someone.code)
         row = next(one for one in people if one["code"] == someone.code)
         entries = _entries(db, LogEntry.detail.startswith(f"{someone.code}: "))
         noted = notes.on(db, someone)
-    rules = live.judged_by(study(), live.quality(study(), answers).get(someone.code))
+    rules = live.judged_by(study(), judged.get(someone.code))
     return render_template(
         "dashboard/participant.html",
         person=someone,
@@ -422,5 +421,13 @@ def report(name: str = "report.html"):
 
 
 def _numbers() -> dict:
-    period_s = current_app.config.get("LIVE_PERIOD_S", live.PERIOD_S)
+    period_s = _period_s()
     return live.shared(database(), study(), period_s)
+
+
+def _everybody(db: Session, code: str | None = None):
+    return current_app.extensions["everybody"].seen(db, study(), _period_s(), code)
+
+
+def _period_s() -> float:
+    return current_app.config.get("LIVE_PERIOD_S", live.PERIOD_S)

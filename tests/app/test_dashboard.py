@@ -360,3 +360,22 @@ def test_a_person_is_held_to_each_declared_rule(person, experimenter):
         "yes",
     )
     assert by_rule["median answer under 500 ms"] == ("321 ms", "yes")
+
+
+def test_pages_about_people_share_what_was_made(app, person, experimenter, monkeypatch):
+    made, judge = [], live.participants
+    monkeypatch.setattr(live, "participants", lambda *a: made.append(1) or judge(*a))
+    app.config["LIVE_PERIOD_S"] = 60
+    somebody = person().begin().answer(1, 2)
+    experimenter.get("/dashboard/participants/P0001")
+    somebody.answer(0)
+    for path in ("participants", "participants/P0001", "participants.csv"):
+        assert "3 / 30" not in experimenter.get(f"/dashboard/{path}").text
+    assert len(made) == 1
+    experimenter.get("/dashboard/participants/P0001")
+    experimenter.send("reason", reason="fell asleep")
+    assert "excluded" in experimenter.get("/dashboard/participants").text  # at once
+    before = len(made)
+    person().begin()
+    assert experimenter.get("/dashboard/participants/P0002").status_code == 200
+    assert len(made) == before + 1
