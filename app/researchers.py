@@ -31,6 +31,7 @@ from werkzeug.http import parse_options_header
 from app import accounts, recruiting
 from app.accounts import Researcher
 from app.database import Database
+from app.errors import InputError
 from app.models import Account
 from app.security import Limiter
 from app.web import database, hosted, wants_json
@@ -58,6 +59,7 @@ class Doorkeeper:
     def __init__(self, database: Database):
         self.database = database
         self._attempts = Limiter(ATTEMPTS, WINDOW_S)
+        self.changes = Limiter(ATTEMPTS, WINDOW_S)  # of passwords, by account
         self._told = Limiter(1, WINDOW_S)
         self._strangers, self._known = _Line(), _Line()
 
@@ -243,6 +245,40 @@ def _set_cookie(response: Response, token: str) -> None:
         httponly=True,
         samesite="Lax",
     )
+
+
+@blueprint.route("/password", methods=["GET", "POST"])
+def password():
+    """Another password for the account that is signed in, by who knows the present one."""
+    if request.method == "GET":
+        lengths = {"shortest": accounts.SHORTEST, "longest": accounts.LONGEST}
+        return render_template("dashboard/password.html", **lengths)
+    name, here = current().name, redirect(url_for(".password"), 303)
+    if not doorkeeper().changes.allow(name):
+        abort(429, "Too many passwords were tried. Wait five minutes and try again.")
+    with doorkeeper().database.read() as db:
+        stored = accounts.named(db, name).password_hash
+    if not accounts.verified(stored, request.form.get("present", "")):
+        flash("The present password is not right; nothing was changed.")
+        return here
+    if request.form.get("wanted") != request.form.get("again"):
+        flash("The new password was typed in two ways; nothing was changed.")
+        return here
+    try:
+        with doorkeeper().database.write() as db:
+            account = accounts.named(db, name)
+            accounts.set_password(db, account, request.form.get("wanted", ""), who=name)
+            token = accounts.sign_in(db, account, ending=None)
+            session["known"] = mark_of(account)
+    except InputError as error:
+        flash(f"Nothing was changed: {error}.")
+        return here
+    doorkeeper().changes.forget(name)
+    session.pop("csrf_token", None)
+    flash("The password was changed.")
+    response = redirect(url_for("dashboard.index"), 303)
+    _set_cookie(response, token)
+    return response
 
 
 @blueprint.post("/logout")

@@ -20,7 +20,7 @@ from app import accounts, archive, create_app, database, researchers
 from app.cli import main
 from app.errors import InputError
 from app.models import Account, AccountEntry, LogEntry, Participant, SignIn, StudyRecord
-from app.researchers import COOKIE
+from app.researchers import ATTEMPTS, COOKIE
 from tests.app.conftest import PASSWORD, Person, researcher
 
 #: That of the application; the tests have a faster one.
@@ -132,7 +132,7 @@ def test_a_viewer_sees_and_changes_nothing(app, person, viewer):
     viewer.get("/dashboard/")
     form = viewer.form("code") | {"state": "closed", "quota": "1", "minutes": "1", "reason": "x"}
     form |= {"count": "3", "only": "yes", "code": "ABC"}
-    looking = {"/dashboard/completion", "/dashboard/login", "/dashboard/logout"}
+    looking = {f"/dashboard/{one}" for one in ("completion", "login", "logout", "password")}
     closed = posts(app) - looking
     assert {"/dashboard/state", "/dashboard/links", "/dashboard/participants/P0001"} <= closed
     for path in sorted(closed):
@@ -234,6 +234,32 @@ def test_a_form_of_before_the_sign_in_is_refused_where_the_sign_in_was_elsewhere
     assert other.http.post("/dashboard/state", data=old).status_code == 400
     other.get("/dashboard/")
     assert set_state(other, "paused").status_code == 200
+
+
+def test_a_viewer_gives_themself_another_password(app, viewer):
+    def change(browser, present, wanted, again=None):
+        browser.get("/dashboard/password")
+        return browser.send("wanted", present=present, wanted=wanted, again=again or wanted).text
+
+    elsewhere, new = researcher(app, "viewer"), "a new pass phrase"
+    assert "not right" in change(viewer, "guessed", new)
+    assert "two ways" in change(viewer, PASSWORD, new, "a new pass phrese")
+    assert "expected 12 to 1000" in change(viewer, PASSWORD, "short")
+    before = entries(app, AccountEntry)
+    assert "was changed" in change(viewer, PASSWORD, new) and viewer.path == "/dashboard/"
+    assert ("viewer", "password changed", "viewer") in entries(app, AccountEntry)[len(before) :]
+    elsewhere.get("/dashboard/")
+    assert elsewhere.path == "/dashboard/login"
+    assert viewer.get("/dashboard/").status_code == 200 and viewer.path == "/dashboard/"
+    other = Person(app)
+    for secret, place in ((PASSWORD, "/dashboard/login"), (new, "/dashboard/")):
+        other.get("/dashboard/login")
+        other.send("password", name="viewer", password=secret)
+        assert other.path == place
+    for _ in range(ATTEMPTS):
+        assert "not right" in change(viewer, "guessed", PASSWORD)
+    viewer.get("/dashboard/password")
+    assert viewer.send("wanted", present=new, wanted=PASSWORD, again=PASSWORD).status_code == 429
 
 
 def test_another_password_and_a_removal_end_every_sign_in(app, experimenter, viewer):

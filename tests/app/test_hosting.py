@@ -1,6 +1,7 @@
 """Several studies on one server: each for itself, one sign-in for all."""
 
 import json
+import random
 import re
 from urllib.parse import urlsplit
 
@@ -348,3 +349,42 @@ def test_health_is_that_of_all(server, monkeypatch):
     for path in ("/health", "/s/hands/health"):
         reply = Visitor(server).get(path)
         assert (reply.status_code, reply.json) == (503, {"status": "no database"})
+
+
+PARTS = ("s", "S", "faces", "hands", "simulated", "dashboard", "question", "static", "images", "")
+ODD = (
+    "..",
+    ".",
+    "%2e%2e",
+    "%2f",
+    "%00",
+    "%ff",
+    "\\",
+    "//evil.example",
+    "é",
+    "a" * 3000,
+    "?",
+    "#",
+    ";",
+)
+
+
+@pytest.mark.parametrize("who", ["stranger", "owner"])
+def test_no_address_of_the_server_fails_or_leads_elsewhere(server, who):
+    """What stands before the studies: which of them an address belongs to."""
+    draw, visitor = random.Random(who), Visitor(server)
+    if who == "owner":
+        visitor.sign_in()
+    for _ in range(300):
+        parts = [draw.choice(draw.choice((PARTS, ODD))) for _ in range(draw.randint(1, 5))]
+        path, query = (
+            "/" + "/".join(parts),
+            draw.choice(("", "?link=%0d%0aX", "?\u0301=1", "?" * 9)),
+        )
+        method = draw.choice(("GET", "GET", "POST", "PUT", "HEAD", "OPTIONS"))
+        reply = visitor.http.open(path + query, method=method, headers={"Host": "evil.example"})
+        asked = f"{method} {path[:99]!r}{query}: {reply.status}"
+        assert reply.status_code < 500, asked
+        place = reply.headers.get("Location", "/")
+        assert place.startswith("/") and not place.startswith(("//", "/\\")), (asked, place)
+        assert "\n" not in place and "X" not in reply.headers, asked

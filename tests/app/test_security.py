@@ -30,6 +30,7 @@ POSTS = [
     "/another",
     "/dashboard/login",
     "/dashboard/logout",
+    "/dashboard/password",
     "/dashboard/completion",
     "/dashboard/state",
     "/dashboard/quota",
@@ -42,6 +43,7 @@ CLOSED = [
     f"/dashboard/{name}"
     for name in (
         "",
+        "password",
         "live.json",
         "responses.csv",
         "participants.csv",
