@@ -689,7 +689,7 @@ def test_the_pages_of_researchers_fit_a_phone_and_axe_finds_nothing(page, addres
     page.fill("[name=name]", "owner")
     page.fill("[name=password]", secret)
     page.click("button:has-text('Sign in')")
-    for path in ("log", "notes", "studies", "participants/P0001"):
+    for path in ("log", "notes", "studies", "password", "participants/P0001"):
         page.goto(f"{address}dashboard/{path}")
         look()
     page.fill("[name=note]", "<b>two</b>\nlines")
