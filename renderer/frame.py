@@ -97,10 +97,9 @@ class Frame:
         if not r.hair:
             return
         depths = occlusion.blocks(self.surface.textures[3].read()[::-1, :, 0])
-        self.surface.bind(depth_test=True, blend="over", only=1)
-        sources = (r.program, r.lamps, r.surroundings, self._shared, self.view.pixels_per_mm)
+        sources = (r.context, r.program, r.lamps, r.surroundings, self._shared)
         for hair in r.hair:
-            hair.draw(*sources, (self.width, self.height), depths)
+            hair.draw(*sources, self.surface, depths)
 
     def _irradiance(self, diffuse: str) -> gl.Texture:
         """Irradiance below a face of that model, alpha the medium's id."""

@@ -15,7 +15,7 @@ from renderer.memory import give_back, give_back_large
 from renderer.optics.transmittance import Translucency
 from renderer.passes.environment import Surroundings
 from renderer.passes.hair import Hair
-from renderer.passes.lamps import Lamps
+from renderer.passes.lamps import LEAST_MM, Lamps
 from renderer.passes.points import Points
 from renderer.passes.surfaces import PLACED_FORMATS, Drawn, Surfaces
 from renderer.scene import graph as graphs
@@ -79,10 +79,12 @@ class Renderer:
             for drawn in self.surfaces.surfaces:
                 base.setdefault(drawn.item.mesh, drawn)
             self.hair = [Hair(item, base[item.mesh]) for item in contents.strands]
-            points = [self.surfaces.vertices(), *(h.points.reshape(-1, 3) for h in self.hair)]
+            points = [self.surfaces.vertices(), *(hair.points for hair in self.hair)]
             everything = np.vstack(points)
-            self.lamps = Lamps(contents.lights, everything, shadow_map)
-            self._draw_shadows()
+            casting = [hair.casting(LEAST_MM) for hair in self.hair]
+            strands = np.vstack([np.empty((0, 3)), *casting])
+            self.lamps = Lamps(contents.lights, everything, strands, shadow_map)
+            self.lamps.draw(self.program, self.surfaces, self.hair)
             for hair in self.hair:
                 hair.light(self.context, self.program, self.lamps, self.surroundings)
         except BaseException:
@@ -124,19 +126,6 @@ class Renderer:
         if key not in self._programs:
             self._programs[key] = gl.Program(fragment, vertex, defines, geometry)
         return self._programs[key]
-
-    def _draw_shadows(self) -> None:
-        def solid(_light, program, shared):
-            self.surfaces.draw_depth(program, shared)
-
-        def strands(light, program, shared):
-            for hair in self.hair:
-                program.use(**shared, model=np.eye(4))
-                hair.draw_shadows(light)
-
-        self.lamps.draw(
-            self.program("passes/shadow.frag", vertex="passes/shadow.vert"), solid, strands
-        )
 
     def frame(self, camera: Camera | None = None, picture: Picture | None = None) -> Frame:
         """Draw what all techniques share for one camera; by default the scene's own.

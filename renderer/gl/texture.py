@@ -125,6 +125,11 @@ class TextureArray(Texture):
         size = (self.width, self.height, self.layers)
         GL.glTexImage3D(self.kind, 0, self.internal, *size, 0, form, number, data)
 
+    def copy_layer(self, layer: int) -> None:
+        """Fill a layer with what was drawn into the bound target, of the same size."""
+        GL.glBindTexture(self.kind, self.id)
+        GL.glCopyTexSubImage3D(self.kind, 0, 0, 0, layer, 0, 0, self.width, self.height)
+
     def read(self) -> np.ndarray:
         """The texels: (layers, height, width, channels) float32, row 0 at the top."""
         form, channels, _ = _FORMATS[self.internal]

@@ -116,7 +116,7 @@ void main() {
     vec3 specular = vec3(0.0), r = reflect(-v, wet_n), qn = vec3(q.xy, iris_z(length(q.xy)));
     if (dot(r, n) < 0.0) r = normalize(r - n * (dot(r, n) - 0.02));
     float nv = max(dot(wet_n, v), 0.02), mirror = schlick(F0, nv);
-    strand_disc_mm = 1.6; strand_share = 0.4;  // lashes are 0.06 mm wide, in the maps 0.16
+    strand_disc_mm = 1.6;  // what passes between lashes is blurred
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world), light_here = lamp_light(k, world);
         float seen = visibility(k, world, n, phase);

@@ -1,4 +1,9 @@
-"""Hair: strands as ribbons towards the camera, far ones first, and towards a lamp."""
+"""Hair: every point of a strand is shaded once a view, strands are ribbons between them, drawn far
+ones first; and towards a lamp, where their opacity is summed over depth.
+
+Deep opacity maps: Yuksel and Keyser 2008, doi:10.1111/j.1467-8659.2008.01165.x: a lamp's map holds
+the depth of the first strand, and the opacity summed to some distances behind it.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +18,15 @@ from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
 from renderer.passes.surfaces import Drawn
 from renderer.scene.graph import Item
-from renderer.scene.lights import DistantLight, Light
 
-EXTINCTION = 1.5  # of the whole layer of hair along its normal
-SHADOW_WIDTH_MM = 0.16  # of a strand in a lamp's map: finer ones would fall between its texels
-MINIMUM_PX = 1.3
+EXTINCTION = 1.5  # of the whole layer of hair along its normal, for light from everywhere
+MINIMUM_PX = 1.3  # a thinner strand is drawn so wide, and its opacity is its width's share of it
+FREE_MM = 6.0  # from its root a point keeps off the skin's own shadow by so much less
+LONG_POINTS = 8  # strands of more points are the scalp's
+MANY = 20000  # strands: of so many, half stand for all in a lamp's map
 COLUMNS = 2048  # texels of a row of points
-CHUNK = 8192  # strands that are put on the graphics card at a time
+SEGMENTS = 4  # of a piece: what is left out or sorted as one
+CHUNK = 32768  # pieces that are put on the graphics card at a time
 
 
 class Hair:
@@ -27,14 +34,50 @@ class Hair:
 
     def __init__(self, item: Item, on: Drawn):
         self.strands, pose = item.primitive.strands, item.pose
+        first = self.strands.first
         self.points = (self.strands.points @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32)
         self.size = float(np.linalg.norm(pose[:3, 0]))
+        self.counts = np.diff(first)
+        self.of = np.repeat(np.arange(len(self.counts)), self.counts)  # strand of each point
         root = self.strands.root_vertex
         turned = on.item.primitive.normals[root] @ pose[:3, :3].T / self.size
         self.normals = turned.astype(np.float32)
         light = on.baked.light[root]
         self.environment = np.maximum(np.einsum("nci,ni->nc", light, self.normals), 0)
+        self.tangents = tangents(self.points, first)
+        self.pieces = pieces(first)
+        self.rows = -(-len(self.points) // COLUMNS)
+        self._fixed: dict[str, gl.Texture] = {}
         self._lit: gl.TextureArray | None = None
+
+    def _per_point(self, xyz: np.ndarray, w: np.ndarray | float) -> gl.Texture:
+        data = np.zeros((self.rows * COLUMNS, 4), np.float32)
+        data[: len(self.points), :3], data[: len(self.points), 3] = xyz, w
+        shape = (self.rows, COLUMNS, 4)
+        return gl.Texture(COLUMNS, self.rows, GL.GL_RGBA32F, data=data.reshape(shape))
+
+    def _per_strand(self, xyz: np.ndarray, w: np.ndarray | float) -> gl.Texture:
+        rows = -(-len(self.counts) // COLUMNS)
+        data = np.zeros((rows * COLUMNS, 4), np.float32)
+        data[: len(self.counts), :3], data[: len(self.counts), 3] = xyz, w
+        return gl.Texture(COLUMNS, rows, GL.GL_RGBA32F, data=data.reshape(rows, COLUMNS, 4))
+
+    def fixed(self) -> dict[str, gl.Texture]:
+        """What no view changes, on the graphics card: of points and of strands."""
+        if not self._fixed:
+            strands = self.strands
+            width = self.size * strands.width_mm
+            last = self.counts[self.of] - 1
+            along = (np.arange(len(self.points)) - strands.first[:-1][self.of]) / last
+            tapered = width[self.of] * (1 + (strands.tip[self.of] - 1) * along**3)
+            self._fixed = {
+                "places": self._per_point(self.points, tapered),
+                "tangents": self._per_point(self.tangents, self.of),
+                "covers": self._per_point(self.normals[self.of], strands.cover),
+                "colours": self._per_strand(strands.colour, width),
+                "environments": self._per_strand(self.environment, 0.0),
+            }
+        return self._fixed
 
     def light(
         self,
@@ -43,129 +86,158 @@ class Hair:
         lamps: Lamps,
         surroundings: Surroundings,
     ) -> None:
-        """Find what of each lamp's light reaches each point, by the lamps' maps: for all views."""
-        count = self.points.shape[0] * self.points.shape[1]
-        rows = -(-count // COLUMNS)
-        normals = np.repeat(self.normals, self.points.shape[1], axis=0)
-        size = (COLUMNS, rows)
+        """Find what of each lamp's light reaches each point, by the lamps' maps: for all views.
 
-        def texels(xyz: np.ndarray, w: np.ndarray | float) -> gl.Texture:
-            data = np.zeros((rows * COLUMNS, 4), np.float32)
-            data[:count, :3], data[:count, 3] = xyz, w
-            return gl.Texture(*size, GL.GL_RGBA32F, data=data.reshape(rows, COLUMNS, 4))
-
-        places = texels(self.points.reshape(-1, 3), self.strands.cover.ravel())
+        Kept as (optical depth of the strands before it, share that surfaces let past).
+        """
+        root = self.points[self.strands.first[:-1]][self.of]
+        away = np.linalg.norm(self.points - root, axis=1) / (FREE_MM * self.size)
+        lift = self._per_point(self.normals[self.of], np.exp(-away))
         values = {
             **lamps.uniforms(),
             **surroundings.uniforms(),
-            "places": places,
-            "normals": texels(normals, 0.0),
-            "extinction": EXTINCTION,
+            "places": self.fixed()["places"],
+            "normals": lift,
         }
         program = programs("passes/hair_lit.frag", {**lamps.defines(), **surroundings.defines()})
-        lit = np.zeros((max(1, len(lamps.lights)), rows, COLUMNS, 1), np.float32)
-        with gl.Target(*size, [GL.GL_R32F]) as target:
+        count = max(1, len(lamps.lights))
+        self._lit = gl.TextureArray(COLUMNS, self.rows, count, GL.GL_RG16F)
+        with gl.Target(COLUMNS, self.rows, [GL.GL_RG16F]) as target:
             for k in range(len(lamps.lights)):
                 target.bind()
                 program.use(**program.accepts({**values, "lamp": k}))
                 gl.draw_fullscreen(context)
-                lit[k] = target.textures[0].read()[::-1]
-        for texture in (places, values["normals"]):
-            texture.delete()
-        self._lit = gl.TextureArray(*size, len(lit), GL.GL_R32F, data=lit)
+                self._lit.copy_layer(k)
+        lift.delete()
 
-    def draw_shadows(self, light: Light) -> None:
-        """Flat ribbons that face a lamp, with the program in use."""
-        for start in range(0, len(self.points), CHUNK):
-            _draw_and_free(self._shadow_ribbons(light, self.points[start : start + CHUNK]))
+    def casting(self, least_mm: float) -> np.ndarray:
+        """Points (M, 3) of the strands that are at least so wide."""
+        return self.points[(self.size * self.strands.width_mm >= least_mm)[self.of]]
 
-    def _shadow_ribbons(self, light: Light, points: np.ndarray) -> gl.Mesh:
-        tangent = np.gradient(points, axis=1)
-        facing = light.towards if isinstance(light, DistantLight) else light.place - points
-        across = np.cross(tangent, np.asarray(facing, np.float32))
-        across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-6)
-        taper = np.linspace(1.0, 0.4, points.shape[1], dtype=np.float32)[None, :, None]
-        half = 0.5 * SHADOW_WIDTH_MM * self.size * taper * across
-        both = np.stack([points - half, points + half], axis=2)
-        return gl.Mesh({0: both.reshape(-1, 3)}, ribbon_faces(*points.shape[:2]))
+    def draw_shadows(self, program: gl.Program, values: dict, least_mm: float) -> None:
+        """Ribbons that face a lamp; strands thinner than least_mm cast no shadow.
 
-    def draw(
+        values: what passes/hair.vert takes for a lamp, and its fragment shader.
+        """
+        fixed = self.fixed()
+        casts = self.size * self.strands.width_mm >= least_mm
+        # of the scalp's hair every second strand stands for two
+        many = (self.counts > LONG_POINTS) & (len(self.counts) > MANY)
+        odd = np.arange(len(self.counts)) % 2 == 1
+        for which, widened in ((casts & ~many, 1.0), (casts & many & odd, 2.0)):
+            shared = {"minimum_px": MINIMUM_PX, "widened": widened}
+            program.use(**program.accepts({**values, **fixed, **shared}))
+            chosen = np.flatnonzero(which[self.of[self.pieces[:, 0]]])
+            for start in range(0, len(chosen), CHUNK):
+                _draw_and_free(self.pieces[chosen[start : start + CHUNK]])
+
+    def shade(
         self,
+        context: gl.Context,
         programs: Callable[..., gl.Program],
         lamps: Lamps,
         surroundings: Surroundings,
         shared: dict,
-        pixels_per_mm: float,
-        size: tuple[int, int],
-        depths: list[np.ndarray],
-    ) -> None:
-        """Blend all strands that can be seen into the bound target.
-
-        shared: camera_position, view, projection; size: of the target in pixels; depths: what
-        `occlusion.blocks` makes of the view depths of surfaces.
-        """
-        half_mm = 0.5 * self.size * self.strands.width_mm
-        matrix = shared["projection"] @ shared["view"]
-        bounds = (self.points, matrix, size, half_mm, 0.5 * MINIMUM_PX)
-        seen = np.flatnonzero(~occlusion.hidden(depths, *bounds))
-        distance = np.linalg.norm(
-            self.points[seen].mean(axis=1) - shared["camera_position"], axis=1
-        )
-        # far strands first: blended back to front
-        order = seen[np.argsort(-distance, kind="stable")]
+    ) -> gl.Target:
+        """Radiance of every point towards the camera; the caller frees it."""
         defines = {**lamps.defines(), **surroundings.defines()}
-        program = programs("passes/hair.frag", defines, vertex="passes/hair.vert")
+        program = programs("passes/hair_shade.frag", defines)
+        strands = self.strands
         values = {
             **shared,
             **lamps.uniforms(),
             **surroundings.uniforms(),
-            "pixels_per_mm": pixels_per_mm,
-            "minimum_px": MINIMUM_PX,
-            "extinction": EXTINCTION,
+            **self.fixed(),
             "lit_map": self._lit,
+            "extinction": EXTINCTION,
+            "tilt": float(np.radians(strands.tilt_deg)),
+            "spread": float(np.radians(strands.spread_deg)),
+            "index": strands.index,
         }
+        target = gl.Target(COLUMNS, self.rows, [GL.GL_RGBA16F])
+        target.bind()
         program.use(**program.accepts(values))
-        for start in range(0, len(order), CHUNK):
-            _draw_and_free(self._ribbons(order[start : start + CHUNK]))
+        gl.draw_fullscreen(context)
+        return target
 
-    def _ribbons(self, chosen: np.ndarray) -> gl.Mesh:
-        """These strands (S,), in their order, as what hair.vert takes."""
-        strands, points = self.strands, self.points[chosen]
-        n, p = points.shape[:2]
-        tangent = np.gradient(points, axis=1)
-        tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-6)
+    def draw(
+        self,
+        context: gl.Context,
+        programs: Callable[..., gl.Program],
+        lamps: Lamps,
+        surroundings: Surroundings,
+        shared: dict,
+        surface: gl.Target,
+        depths: list[np.ndarray],
+    ) -> None:
+        """Blend all strands that can be seen over the specular light of a frame.
 
-        def twice(array: np.ndarray) -> np.ndarray:
-            return np.repeat(array.reshape(n * p, -1).astype(np.float32), 2, axis=0)
+        shared: camera_position, view, projection; surface: the frame's buffers; depths: what
+        `occlusion.blocks` makes of the view depths of surfaces.
+        """
+        matrix = shared["projection"] @ shared["view"]
+        size = (surface.width, surface.height)
+        half_mm = 0.5 * self.size * self.strands.width_mm[self.of[self.pieces[:, 0]]]
+        points = self.points[self.pieces]
+        bounds = (points, matrix, size, half_mm, 0.5 * MINIMUM_PX)
+        seen = np.flatnonzero(~occlusion.hidden(depths, *bounds))
+        if not len(seen):
+            return
+        # far pieces first: blended back to front
+        distance = np.linalg.norm(points[seen, SEGMENTS // 2] - shared["camera_position"], axis=1)
+        order = seen[np.argsort(-distance, kind="stable")]
+        with self.shade(context, programs, lamps, surroundings, shared) as shaded:
+            surface.bind(depth_test=True, blend="over", only=1)
+            program = programs("passes/hair.frag", {"LAMP": 0}, vertex="passes/hair.vert")
+            values = {
+                "matrix": matrix,
+                "drawn_size": size,
+                "minimum_px": MINIMUM_PX,
+                "widened": 1.0,
+                "radiances": shaded.textures[0],
+                **self.fixed(),
+            }
+            program.use(**program.accepts(values))
+            for start in range(0, len(order), CHUNK):
+                _draw_and_free(self.pieces[order[start : start + CHUNK]])
 
-        def per_strand(array: np.ndarray) -> np.ndarray:
-            return twice(np.repeat(array[chosen][:, None, :], p, axis=1))
 
-        strand = np.empty((2 * n * p, 4), np.float32)
-        strand[:, 0] = np.tile([-1.0, 1.0], n * p)
-        strand[:, 1:2] = twice(np.repeat(self.size * strands.width_mm[chosen][:, None], p, axis=1))
-        strand[:, 2:3] = twice(strands.cover[chosen])
-        strand[:, 3:4] = twice(np.tile(np.linspace(0, 1, p), (n, 1)))
-        attributes = {
-            0: twice(points),
-            1: twice(tangent),
-            2: strand,
-            3: per_strand(strands.colour),
-            4: per_strand(self.environment),
-            5: twice(chosen[:, None] * p + np.arange(p)),
-        }
-        return gl.Mesh(attributes, ribbon_faces(n, p))
-
-
-def _draw_and_free(mesh: gl.Mesh) -> None:
-    """Draw and wait: a software driver keeps what is still to be drawn, deleted or not."""
+def _draw_and_free(chosen: np.ndarray) -> None:
+    """Draw pieces (K, SEGMENTS + 1) and wait: a software driver keeps what is still to be drawn,
+    deleted or not.
+    """
+    mesh = gl.Mesh({}, ribbon_faces(chosen))
     mesh.draw()
     gl.finish()
     mesh.delete()
 
 
-def ribbon_faces(strands: int, points: int) -> np.ndarray:
-    """Triangles (2 S (P - 1), 3) of S ribbons of P point pairs, strand by strand."""
-    base = (np.arange(strands)[:, None] * points + np.arange(points - 1)[None]).ravel() * 2
-    corners = [base, base + 1, base + 2, base + 1, base + 3, base + 2]
-    return np.stack(corners, axis=1).reshape(-1, 3)
+def tangents(points: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Unit tangents (N, 3) of polylines with points (N, 3) that begin at first[:-1]."""
+    before, after = np.arange(len(points)) - 1, np.arange(len(points)) + 1
+    before[first[:-1]] += 1
+    after[first[1:] - 1] -= 1
+    tangent = points[after] - points[before]
+    return tangent / np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-6)
+
+
+def pieces(first: np.ndarray) -> np.ndarray:
+    """The strands cut into runs of SEGMENTS segments (K, SEGMENTS + 1): indices of points, the last
+    one again where a strand ends.
+    """
+    segments = np.diff(first) - 1
+    runs = -(-segments // SEGMENTS)
+    of = np.repeat(np.arange(len(runs)), runs)
+    number = np.arange(len(of)) - np.repeat(np.cumsum(runs) - runs, runs)
+    start = first[:-1][of] + SEGMENTS * number
+    ends = first[1:][of] - 1
+    return np.minimum(start[:, None] + np.arange(SEGMENTS + 1), ends[:, None]).astype(np.uint32)
+
+
+def ribbon_faces(chosen: np.ndarray) -> np.ndarray:
+    """Triangles (2 K SEGMENTS, 3) of ribbons along pieces: vertex 2 k + side of point k."""
+    base = 2 * chosen
+    a, b = base[:, :-1].ravel(), base[:, 1:].ravel()
+    real = a != b
+    a, b = a[real], b[real]
+    return np.stack([a, a + 1, b, a + 1, b + 1, b], axis=1).reshape(-1, 3)

@@ -1,29 +1,35 @@
-// A strand as a ribbon that faces the camera: at least one pixel wide, the rest of its width in its opacity.
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec3 tangent_in;
-layout(location = 2) in vec4 strand;    // side -1 or 1, width mm, cover, along the strand 0..1
-layout(location = 3) in vec3 albedo_in;
-layout(location = 4) in vec3 environment_in;
-layout(location = 5) in float number;    // of the point among all of its mesh
-uniform mat4 view;
-uniform mat4 projection;
-uniform vec3 camera_position;
-uniform float pixels_per_mm;   // at 1 mm
+// A point of a strand as two corners of a ribbon that faces the camera or a lamp: at least minimum_px wide, and as opaque as its own
+// width's share of that, so that what a thin strand covers is right at every distance. Points are read by their number.
+uniform sampler2D places;      // xyz: mm in the world, w: width in mm
+uniform sampler2D tangents;    // xyz: unit, w: number of the strand
+uniform mat4 matrix;           // world to clip space
+uniform vec2 drawn_size;       // pixels
 uniform float minimum_px;
-uniform sampler2DArray lit_map; // what of each lamp's light reaches a point (passes/hair_lit.frag)
-out vec3 world; out vec3 tangent; out vec3 albedo; out vec3 around; out float cover; out float opacity; out float lit[LAMPS];
+uniform float widened;         // widths are multiplied by this: a strand stands for several
+out float opacity;
+#if LAMP
+out float depth_mm;
+#else
+uniform sampler2D radiances;   // of points, towards the camera (passes/hair_shade.frag)
+out vec3 radiance;
+#endif
 void main() {
-    vec3 to_eye = normalize(camera_position - position);
-    vec3 across = cross(tangent_in, to_eye);
-    across /= max(length(across), 1e-4);
-    float depth = -(view * vec4(position, 1.0)).z;
-    float width = strand.y * mix(1.0, 0.35, strand.w * strand.w);
-    float pixels = width * pixels_per_mm / depth;
-    float wide = max(pixels, minimum_px) * depth / pixels_per_mm;
-    opacity = min(pixels / minimum_px, 1.0);
-    world = position + across * strand.x * 0.5 * wide;
-    tangent = tangent_in; albedo = albedo_in; around = environment_in; cover = strand.z;
-    int columns = textureSize(lit_map, 0).x, point = int(number);
-    for (int k = 0; k < LAMPS; ++k) lit[k] = texelFetch(lit_map, ivec3(point % columns, point / columns, k), 0).r;
-    gl_Position = projection * view * vec4(world, 1.0);
+    int point = gl_VertexID >> 1, columns = textureSize(places, 0).x;
+    ivec2 at = ivec2(point % columns, point / columns);
+    vec4 place = texelFetch(places, at, 0);
+    vec4 here = matrix * vec4(place.xyz, 1.0), step_on = matrix * vec4(texelFetch(tangents, at, 0).xyz, 0.0);
+    vec2 along = (step_on.xy * here.w - here.xy * step_on.w) * drawn_size;
+    float reach = length(along);
+    vec2 across = reach > 1e-9 ? vec2(-along.y, along.x) / reach : vec2(1.0, 0.0);
+    float scale = length(vec3(matrix[0].x, matrix[1].x, matrix[2].x)) * 0.5 * drawn_size.x / here.w;  // pixels a mm
+    float pixels = place.w * widened * scale, wide = max(pixels, minimum_px);
+    opacity = pixels / wide;
+    vec2 moved = here.xy + here.w * across * (gl_VertexID % 2 == 0 ? -1.0 : 1.0) * wide / drawn_size;
+#if LAMP
+    depth_mm = here.z;
+    gl_Position = vec4(moved, 0.0, here.w);
+#else
+    radiance = texelFetch(radiances, at, 0).rgb;
+    gl_Position = vec4(moved, here.zw);
+#endif
 }

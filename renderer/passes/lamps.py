@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from renderer import gl
+from renderer.gl import GL
 from renderer.scene.graph import look_at
 from renderer.scene.lights import DistantLight, Light, PointLight, SpotLight
 
+if TYPE_CHECKING:
+    from renderer.passes.hair import Hair
+    from renderer.passes.surfaces import Surfaces
+
+STRAND_SHARE = 2  # the maps of hair have so many times fewer pixels a side
+LEAST_MM = 0.03  # thinner strands, vellus, cast no shadow
 MARGIN_MM = 2.0  # around what is seen from a distant lamp
 NEAREST_MM = 1.0  # of a cone's depths
 _CUBE = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
@@ -83,10 +91,13 @@ def layers_of(light: Light, points: np.ndarray) -> list[Layer]:
 class Lamps:
     """The lamps of a scene with their maps; `uniforms` gives what lighting.glsl takes.
 
-    map_size: pixels of a map's side; points (N, 3): everything that casts shadows, mm.
+    map_size: pixels of a map's side; points (N, 3): all surfaces, mm; strands (M, 3): all points of
+    hair that casts shadows.
     """
 
-    def __init__(self, lights: Sequence[Light], points: np.ndarray, map_size: int):
+    def __init__(
+        self, lights: Sequence[Light], points: np.ndarray, strands: np.ndarray, map_size: int
+    ):
         self.lights = list(lights)
         self.layers: list[Layer] = []
         self.first: list[int] = []
@@ -96,29 +107,61 @@ class Lamps:
             self.first.append(len(self.layers) if layers else -1)
             self.faces.append(len(layers))
             self.layers += layers
-        self.depth_range = 1.01 * max((layer.farthest_mm for layer in self.layers), default=1.0)
+        # hair has maps of its own, no wider than it is
+        near = [layers_of(light, strands) if len(strands) else [] for light in self.lights]
+        self.strand_first = [sum(map(len, near[:k])) if own else -1 for k, own in enumerate(near)]
+        self.strand_faces = [len(own) for own in near]
+        self.strand_layers = [layer for own in near for layer in own]
+        farthest = [layer.farthest_mm for layer in (*self.layers, *self.strand_layers)]
+        self.depth_range = 1.01 * max(farthest, default=1.0)
         size, count = (map_size, len(self.layers)) if self.layers else (1, 1)
-        self.solid, self.strands = gl.DepthArray(size, count), gl.DepthArray(size, count)
+        self.solid = gl.DepthArray(size, count)
+        side, count = max(1, map_size // STRAND_SHARE), len(self.strand_layers)
+        self.strand_size, count = (side, count) if count else (1, 1)
+        self.strands = gl.DepthArray(self.strand_size, count)
+        self.sums = gl.TextureArray(self.strand_size, self.strand_size, count, GL.GL_RGBA16F)
 
-    def draw(self, program: gl.Program, solid, strands) -> None:
-        """Draw all layers; solid, strands: (lamp, draw(**uniforms)) -> None, called for each."""
-        for k, light in enumerate(self.lights):
-            for face in range(self.faces[k]):
-                index = self.first[k] + face
-                shared = {"layer": self.layers[index].matrix, "depth_range": self.depth_range}
-                self.solid.bind_layer(index)
-                solid(light, program, shared)
+    def draw(self, programs: Callable[..., gl.Program], surfaces: Surfaces, hair: list[Hair]):
+        """Draw all layers: the depth of surfaces, that of the first strand, and sums of opacity."""
+        solid = programs("passes/shadow.frag", vertex="passes/shadow.vert")
+        towards = {"defines": {"LAMP": 1}, "vertex": "passes/hair.vert"}
+        first = programs("passes/hair_depth.frag", **towards)
+        sums = programs("passes/hair_sums.frag", **towards)
+        side = self.strand_size
+        for index, layer in enumerate(self.layers):
+            self.solid.bind_layer(index)
+            shared = {"layer": layer.matrix, "depth_range": self.depth_range}
+            surfaces.draw_depth(solid, shared)
+        with gl.Target(side, side, [GL.GL_RGBA16F]) as target:
+            for index, layer in enumerate(self.strand_layers):
+                values = {
+                    "matrix": layer.matrix,
+                    "drawn_size": (side, side),
+                    "depth_range": self.depth_range,
+                    "strand_depth": self.strands.array,
+                    "index_of_layer": index,
+                }
                 self.strands.bind_layer(index)
-                strands(light, program, shared)
+                for own in hair:
+                    own.draw_shadows(first, values, LEAST_MM)
+                target.bind(clear=(0.0, 0.0, 0.0, 0.0), blend="add")
+                for own in hair:
+                    own.draw_shadows(sums, values, LEAST_MM)
+                self.sums.copy_layer(index)
 
     def defines(self) -> dict[str, int]:
         """Sizes of the shaders' arrays."""
-        return {"LAMPS": max(1, len(self.lights)), "LAYERS": max(1, len(self.layers))}
+        return {
+            "LAMPS": max(1, len(self.lights)),
+            "LAYERS": max(1, len(self.layers)),
+            "STRAND_LAYERS": max(1, len(self.strand_layers)),
+        }
 
     def uniforms(self) -> dict:
         """What lighting.glsl takes of lamps; arrays are padded to one entry where there is none."""
         lights = self.lights or [DistantLight(irradiance=(0.0, 0.0, 0.0), shadow=False)]
         layers = self.layers or [Layer(np.eye(4), 1.0, 1.0)]
+        strand_layers = self.strand_layers or [Layer(np.eye(4), 1.0, 1.0)]
         positional = [isinstance(light, PointLight) for light in lights]
         place = [
             np.append(light.place if point else light.towards, float(point))
@@ -137,14 +180,20 @@ class Lamps:
             "lamp_faces": np.array(self.faces or [0]),
             "layer_matrix": np.array([layer.matrix for layer in layers]),
             "layer_scale": np.array([layer.scale for layer in layers]),
+            "strand_layer": np.array(self.strand_first or [-1]),
+            "strand_faces": np.array(self.strand_faces or [0]),
+            "strand_matrix": np.array([layer.matrix for layer in strand_layers]),
+            "strand_scale": np.array([layer.scale for layer in strand_layers]),
             "depth_range": self.depth_range,
             "solid_depth": self.solid.array,
             "strand_depth": self.strands.array,
+            "strand_sums": self.sums,
         }
 
     def delete(self) -> None:
         self.solid.delete()
         self.strands.delete()
+        self.sums.delete()
 
 
 def _falloff(light: Light) -> tuple[float, float, float, float]:

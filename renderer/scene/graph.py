@@ -62,10 +62,9 @@ class StrandPrimitive(pyrender.Primitive):
     """Hair: its points as lines; the strands stand on the surface of the same mesh."""
 
     def __init__(self, strands: Strands):
-        n, p = strands.points.shape[:2]
-        start = (np.arange(n)[:, None] * p + np.arange(p - 1)).ravel()
+        start = np.delete(np.arange(len(strands.points)), strands.first[1:] - 1)
         lines = np.stack([start, start + 1], axis=1)
-        super().__init__(strands.points.reshape(-1, 3), indices=lines, mode=1)
+        super().__init__(strands.points, indices=lines, mode=1)
         self.strands = strands
 
 

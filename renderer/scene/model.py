@@ -133,15 +133,26 @@ class Eye:
 
 @dataclass(frozen=True)
 class Strands:
-    """Hair as polylines: points (S, P, 3) mm; width_mm (S,); colour (S, 3) linear albedo; cover (S,
-    P) in [0, 1], the share of the hair layer above each point; root_vertex (S,) index into Surface.
+    """Hair as polylines of any number of points.
+
+    points (N, 3) mm, strand by strand from root to tip; first (S + 1,) where each begins, and N;
+    width_mm (S,) at the root, tip (S,) that at the end as a share of it; colour (S, 3) linear: what
+    two ways through the fibre leave of light (absorption); cover (N,) in [0, 1], the share of the
+    hair layer above each point; root_vertex (S,) index into Surface. Of all fibres: tilt_deg of the
+    cuticle's scales, spread_deg, the standard deviation of the primary highlight, and the
+    refractive index (Marschner et al. 2003, table 1, doi:10.1145/882262.882345).
     """
 
     points: np.ndarray
+    first: np.ndarray
     width_mm: np.ndarray
+    tip: np.ndarray
     colour: np.ndarray
     cover: np.ndarray
     root_vertex: np.ndarray
+    tilt_deg: float = 3.5
+    spread_deg: float = 7.5
+    index: float = 1.55
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,15 @@ uniform int lamp_layer[LAMPS];        // first layer of its shadow map; -1: none
 uniform int lamp_faces[LAMPS];        // layers: 1, or the 6 faces of a cube about the lamp
 uniform mat4 layer_matrix[LAYERS];    // world to the map: xy (over w), z in mm along the layer's axis
 uniform float layer_scale[LAYERS];    // uv per mm, for a cone at a depth of 1 mm
+uniform int strand_layer[LAMPS];      // the same of the maps of hair, which are no wider than it is
+uniform int strand_faces[LAMPS];
+uniform mat4 strand_matrix[STRAND_LAYERS];
+uniform float strand_scale[STRAND_LAYERS];
 uniform float depth_range;            // mm of depth 1 in the maps
 uniform sampler2DArray solid_depth;   // surfaces and eyes
-uniform sampler2DArray strand_depth;  // hair
+uniform sampler2DArray strand_depth;  // the first strand of hair
+uniform sampler2DArray strand_sums;   // optical depth of strands up to DEEP_MM behind it
+#include "shaders/deep.glsl"
 #include "shaders/environment.glsl"
 
 bool distant(int lamp) { return lamp_place[lamp].w == 0.0; }
@@ -53,28 +59,25 @@ vec3 lamp_mirrored(int lamp, vec3 p, vec3 r, float blur) {
 }
 
 float layer_depth(int layer, vec2 at) { return texture(solid_depth, vec3(at, float(layer))).r * depth_range; }
-float layer_strands(int layer, vec2 at) { return texture(strand_depth, vec3(at, float(layer))).r * depth_range; }
-// The layer that sees p: the only one, or the cube's face (+x, -x, +y, -y, +z, -z).
-int layer_of(int lamp, vec3 p) {
-    if (lamp_faces[lamp] == 1) return lamp_layer[lamp];
+// The place of the layer that sees p: the only one, or the cube's face (+x, -x, +y, -y, +z, -z).
+int face_of(int lamp, int faces, vec3 p) {
+    if (faces == 1) return 0;
     vec3 d = p - lamp_place[lamp].xyz, a = abs(d);
-    int face = a.x >= a.y && a.x >= a.z ? (d.x < 0.0 ? 1 : 0) : a.y >= a.z ? (d.y < 0.0 ? 3 : 2) : (d.z < 0.0 ? 5 : 4);
-    return lamp_layer[lamp] + face;
+    return a.x >= a.y && a.x >= a.z ? (d.x < 0.0 ? 1 : 0) : a.y >= a.z ? (d.y < 0.0 ? 3 : 2) : (d.z < 0.0 ? 5 : 4);
 }
+int layer_of(int lamp, vec3 p) { return lamp_layer[lamp] + face_of(lamp, lamp_faces[lamp], p); }
 // Map coordinates and depth in mm.
-vec3 to_layer(int layer, vec3 p) {
-    vec4 q = layer_matrix[layer] * vec4(p, 1.0);
+vec3 to_map(mat4 matrix, vec3 p) {
+    vec4 q = matrix * vec4(p, 1.0);
     return vec3(q.xy / q.w * 0.5 + 0.5, q.z);
 }
+vec3 to_layer(int layer, vec3 p) { return to_map(layer_matrix[layer], p); }
 float scale_of(int lamp, int layer, float depth) {  // uv per mm
     return distant(lamp) ? layer_scale[layer] : layer_scale[layer] / max(depth, 1.0);
 }
 
-// Strands are drawn wider into the lamps' maps than they are (renderer/passes/hair.py): how wide a disc of them is averaged, mm, and how much
-// of what they cover is dark. Surfaces under lashes say more.
-float strand_disc_mm = 0.8, strand_share = 1.0;
-// Visibility of a lamp in [0, 1]: percentage-closer soft shadows (Fernando 2005) over a Vogel disc.
-float visibility(int lamp, vec3 p, vec3 n, float phase) {
+// Share of a lamp's light that surfaces let past: percentage-closer soft shadows (Fernando 2005) over a Vogel disc.
+float surfaces_let_past(int lamp, vec3 p, vec3 n, float phase) {
     if (lamp_layer[lamp] < 0) return 1.0;
     float slope = clamp(1.0 - dot(n, lamp_towards(lamp, p)), 0.0, 1.0);
     vec3 inner = p + n * (0.35 + 0.9 * slope);
@@ -95,25 +98,51 @@ float visibility(int lamp, vec3 p, vec3 n, float phase) {
         float z = layer_depth(layer, q.xy + o);
         if (z < q.z + dot(rise, o) / scale - 0.6 - 0.1 * length(o) / scale) { sum += z; count += 1.0; }
     }
-    float lit = 1.0;
-    if (count > 0.0) {
-        float blocker = sum / count;
-        float width = distant(lamp) ? (q.z - blocker) * size : size * (q.z - blocker) / max(blocker, 1.0);
-        float penumbra = max(width, 0.25) * scale;
-        lit = 0.0;
-        for (int k = 0; k < 24; ++k) {
-            vec2 o = penumbra * vogel(k, 24, phase + 1.7);
-            lit += layer_depth(layer, q.xy + o) < q.z + dot(rise, o) / scale - 0.25 - 0.1 * length(o) / scale ? 0.0 : 1.0;
-        }
-        lit /= 24.0;
+    if (count == 0.0) return 1.0;
+    float blocker = sum / count;
+    float width = distant(lamp) ? (q.z - blocker) * size : size * (q.z - blocker) / max(blocker, 1.0);
+    float penumbra = max(width, 0.25) * scale, lit = 0.0;
+    for (int k = 0; k < 24; ++k) {
+        vec2 o = penumbra * vogel(k, 24, phase + 1.7);
+        lit += layer_depth(layer, q.xy + o) < q.z + dot(rise, o) / scale - 0.25 - 0.1 * length(o) / scale ? 0.0 : 1.0;
     }
-    float through = 0.0;  // strands: a fixed small disc
-    float texel = 1.0 / float(textureSize(strand_depth, 0).x);
-    for (int k = 0; k < 12; ++k) {
-        vec2 o = max(strand_disc_mm * scale, 1.5 * texel) * vogel(k, 12, phase + 0.4);
-        through += layer_strands(layer, q.xy + o) < q.z - 0.3 ? 0.0 : 1.0;
+    return lit / 24.0;
+}
+
+// Optical depth of strands before a depth in a lamp's map: deep opacity maps, Yuksel and Keyser 2008.
+float strands_at(int layer, vec2 at, float depth) {
+    float d = depth - texture(strand_depth, vec3(at, float(layer))).r * depth_range;
+    if (d <= 0.0) return 0.0;
+    vec4 s = texture(strand_sums, vec3(at, float(layer))), m = DEEP_MM;
+    if (d < m.x) return s.x * d / m.x;
+    if (d < m.y) return mix(s.x, s.y, (d - m.x) / (m.y - m.x));
+    if (d < m.z) return mix(s.y, s.z, (d - m.y) / (m.z - m.y));
+    return mix(s.z, s.w, min((d - m.z) / (m.w - m.z), 1.0));
+}
+// Optical depth of the strands between p and a lamp: of their mean transmittance over a disc of `least` mm, or as wide as the lamp is
+// behind the first strand. Strands count up to `nearer` mm before p.
+float strands_before(int lamp, vec3 p, float nearer, float least, float phase) {
+    if (strand_layer[lamp] < 0) return 0.0;
+    int layer = strand_layer[lamp] + face_of(lamp, strand_faces[lamp], p);
+    vec3 q = to_map(strand_matrix[layer], p);
+    float scale = distant(lamp) ? strand_scale[layer] : strand_scale[layer] / max(q.z, 1.0);
+    float first = depth_range, texel = 1.0 / float(textureSize(strand_depth, 0).x);
+    float size = distant(lamp) ? lamp_size[lamp] : lamp_size[lamp] / max(q.z, 1.0);
+    for (int k = 0; k < 5; ++k) {  // the nearest of what stands before it
+        vec2 o = max(2.0 * texel, 12.0 * size * scale) * vogel(k, 5, phase);
+        first = min(first, texture(strand_depth, vec3(q.xy + o, float(layer))).r * depth_range);
     }
-    return lit * mix(1.0, through / 12.0, strand_share);
+    float wide = max(max(least, clamp(q.z - first, 0.0, 60.0) * size) * scale, 1.3 * texel), sum = 0.0;
+    for (int k = 0; k < 10; ++k) sum += exp(-strands_at(layer, q.xy + wide * vogel(k, 10, phase + 0.4), q.z + nearer));
+    return -log(max(sum / 10.0, 1e-4));
+}
+
+float strand_disc_mm = 0.2;  // how wide a disc of strands is averaged at least; the ball under lashes says more
+// Visibility of a lamp in [0, 1] from a surface: past surfaces and through hair.
+float visibility(int lamp, vec3 p, vec3 n, float phase) {
+    if (lamp_layer[lamp] < 0) return 1.0;
+    float lit = surfaces_let_past(lamp, p, n, phase);
+    return lit > 0.0 ? lit * exp(-strands_before(lamp, p, -0.02, strand_disc_mm, phase)) : 0.0;
 }
 
 // What a lamp's size adds to the squared Beckmann slope of a mirror that shows it: a disc of the sine t is t/2 of slopes of the half

@@ -11,12 +11,14 @@ import trimesh
 
 from renderer.scene import MASKS, Strands
 from renderer.scene.shapes import points_on, triangle_areas
-from stimuli.heads import lashes
+from stimuli.heads import growth, lashes
 from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.person import Hair, Lashes
-from stimuli.heads.skin import azimuth, smoothstep
+from stimuli.heads.skin import smoothstep
+from stimuli.heads.styles import Style
 
 POINTS = 7
+TIP = 0.35  # of the width at the root, where a hair was never cut
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def _tangential(vector: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-6)
 
 
-def grow(
+def straight(
     roots: Roots,
     flow: np.ndarray,
     length: np.ndarray,
@@ -77,20 +79,21 @@ def grow(
     bend: np.ndarray,
     rng: np.random.Generator,
     frizz: float = 0.0,
+    points: int = POINTS,
 ) -> np.ndarray:
-    """Strands (S, POINTS, 3): start `lift` radians above the skin along `flow` (S, 3), and lie down
-    by `bend` radians.
+    """Short strands (S, points, 3): start `lift` radians above the skin along `flow` (S, 3), and
+    lie down by `bend` radians.
     """
-    s = np.linspace(0, 1, POINTS)
+    s = np.linspace(0, 1, points)
     angle = lift[:, None] - bend[:, None] * s[None]
     step = (
         np.cos(angle)[..., None] * flow[:, None] + np.sin(angle)[..., None] * roots.normals[:, None]
     )
     if frizz:
         step += (
-            frizz * np.cumsum(rng.normal(size=(len(length), POINTS, 3)), axis=1) / np.sqrt(POINTS)
+            frizz * np.cumsum(rng.normal(size=(len(length), points, 3)), axis=1) / np.sqrt(points)
         )
-    step *= (length / (POINTS - 1))[:, None, None]
+    step *= (length / (points - 1))[:, None, None]
     offsets = np.concatenate(
         [np.zeros((len(length), 1, 3)), np.cumsum(step[:, :-1], axis=1)], axis=1
     )
@@ -123,47 +126,163 @@ def _pack(points, width, colour, cover, vertex) -> dict:
     }
 
 
+def pigmented(own: Hair, tone: np.ndarray, grey: np.ndarray) -> np.ndarray:
+    """Colours (S, 3): the person's, lighter or darker by exp(tone) (S,), without pigment where
+    grey (S,) says so.
+    """
+    colours = np.array(own.colour) * np.exp(tone)[:, None]
+    bare = np.array(own.grey_colour) * np.exp(0.3 * tone)[:, None]
+    return np.clip(np.where(grey[:, None], bare, colours), 0.0, 0.95)
+
+
 def scalp_hair(
-    scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int, own: Hair
-) -> dict:
-    """A short cut: longer and combed forward on top, fading towards the neck and the ears."""
-    roots = scatter_roots(scalp, scalp.column("hair") ** 1.5, count, rng)
-    p, n = roots.points, roots.normals
-    up = p[:, 1] - eyes[1]
-    around = azimuth(p)
-    on_top = smoothstep(40, 92, up + 0.10 * (90 - around))
-    side = np.sign(p[:, 0])[:, None] * [1.0, 0, 0]
-    forward = np.array([0.35, 0.0, 1.0]) + 0.0 * p
-    down = np.array([0, -1.0, -0.45]) + 0.15 * side
-    flow = _tangential(
-        on_top[:, None] * forward
-        + (1 - on_top)[:, None] * down
-        + 0.30 * _noise(p, 16, 0.3)
-        + 0.22 * _noise(p, 5, 2.0)
-        + 0.20 * rng.normal(size=p.shape),
-        n,
-    )
-    hair = roots.at(scalp.column("hair"))
-    length = own.scalp_length * (
-        (4.5 + 8.0 * smoothstep(-60, 60, up) + 16.0 * on_top)
-        * (0.75 + 0.25 * hair)
-        * rng.uniform(0.7, 1.1, count)
-    )
-    # the front edge is short and fine
-    length *= 0.45 + 0.55 * hair
-    lift = np.radians(24 + 14 * on_top + 8 * rng.normal(size=count))
-    points = grow(roots, flow, length, lift, np.radians(18 + 22 * on_top), rng, frizz=0.08)
-    layer = 2.5 + 5.5 * on_top
-    height = np.einsum("spj,sj->sp", points - p[:, None], n)
-    cover = np.clip(1 - height / layer[:, None], 0, 1)
-    tone = np.exp(0.25 * rng.normal(size=(count, 1)))
-    return _pack(
-        points,
-        np.full(count, 0.095) * (0.6 + 0.4 * hair),
-        np.array(own.colour) * tone * (1 + 0.25 * _noise(p, 12, 5)[:, :1]),
-        cover,
-        roots.vertex,
-    )
+    scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, share: float, own: Hair
+) -> list[dict]:
+    """The hair of the scalp by the person's style, and the fine short hair of the hairline."""
+    style, mask = own.style, scalp.column("hair")
+    if not own.scalp or not mask.any():
+        return []
+    around = scalp.positions
+    rough = mask + 0.20 * _noise(around, 2.6, 0.3)[:, 0] + 0.10 * _noise(around, 7.0, 1.0)[:, 1]
+    sides = np.where(around[:, 0] < style.part_mm, -1.0, 1.0)
+    says = growth.combed(style, around, eyes, sides)
+    density = smoothstep(0.10, 0.95, rough) * (mask > 0.02) * says.density
+    roots = scatter_roots(scalp, density, int(own.scalp * share), rng)
+    skin, longest = _around(scalp, mask, own), own.scalp_length
+    groups = [_styled(roots, skin, scalp, eyes, rng, share, own)]
+    baby = np.clip(1 - np.abs(rough - 0.22) / 0.22, 0, 1) * (mask > 0.004) * says.density
+    count = int(style.baby_hairs * share)
+    if count and baby.sum() > 0:
+        roots = scatter_roots(scalp, baby, count, rng)
+        at = growth.combed(style, roots.points, eyes, _sides(style, roots.points))
+        flow = at.comb + 0.35 * rng.normal(size=(count, 3))
+        length = np.minimum(rng.gamma(3.0, 2.6, count) + 1.5, 0.8 * longest * at.length + 1.0)
+        lift = np.radians(rng.uniform(6, 28, count))
+        points = straight(
+            roots, _tangential(flow, roots.normals), length, lift, 1.4 * lift, rng, frizz=0.10
+        )
+        tone = own.lightness * rng.normal(size=count) + 0.35
+        groups.append(
+            _pack(
+                points,
+                own.width_mm * rng.uniform(0.35, 0.65, count),
+                pigmented(own, tone, rng.random(count) < own.grey),
+                np.full((count, POINTS), 0.1),
+                roots.vertex,
+            )
+        )
+    return groups
+
+
+def _sides(style: Style, points: np.ndarray) -> np.ndarray:
+    wander = 0.7 * _noise(points, 6.0, 2.0)[:, 0]
+    return np.where(points[:, 0] + wander < style.part_mm, -1.0, 1.0)
+
+
+def _around(scalp: Scalp, mask: np.ndarray, own: Hair) -> growth.Grid:
+    """Distances from the skin wherever the hair may hang."""
+    haired = scalp.positions[mask > 0.02]
+    longest = own.scalp_length * max(row[2] for row in own.style.anchors)
+    pad = np.minimum(longest, 45.0) + 8.0
+    low, high = haired.min(axis=0) - pad, haired.max(axis=0) + pad
+    low[1] -= max(longest - 60.0, 0.0)
+    near = ((scalp.positions > low - 40) & (scalp.positions < high + 40)).all(axis=1)
+    return growth.distances(scalp.positions[near], scalp.normals[near], low, high)
+
+
+def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair) -> dict:
+    style, p, n = own.style, roots.points, roots.normals
+    if style.part_reach_mm:  # skin shows in the parting
+        off = (p[:, 0] + 0.7 * _noise(p, 6.0, 2.0)[:, 0] - style.part_mm) / style.part_gap_mm
+        bare = np.exp(-(off**2)) * growth.parting_nearness(style, p, eyes)
+        kept = rng.random(len(p)) >= bare
+        fields = (roots.points, roots.normals, roots.vertex, roots.corners, roots.weights)
+        roots = Roots(*(values[kept] for values in fields))
+        p, n = roots.points, roots.normals
+    count, sides = len(p), _sides(style, p)
+    says, whole = growth.combed(style, p, eyes, sides), roots.at(scalp.column("hair"))
+    # draws of locks, tufts and strands
+    tuft = growth.nearest_of(p, sides, max(1, int(style.tufts * share)), rng)
+    tufts, own_tuft = np.unique(tuft, return_inverse=True)
+    many = max(1, int(style.locks * share))
+    lock = growth.nearest_of(p[tufts], sides[tufts], many, rng)[own_tuft]
+
+    def draw(a: float, b: float, c: float, *shape: int) -> np.ndarray:
+        """Normal, with so much of locks, tufts and strands (S, ...)."""
+        one, two = (rng.normal(size=(len(tufts), *shape)) for _ in range(2))
+        return a * one[lock] + b * two[own_tuft] + c * rng.normal(size=(count, *shape))
+
+    fly = rng.random(count) < style.flyaways
+    turn = np.tan(np.radians(style.stray_deg)) * draw(0.75, 0.5, 0.35, 3)
+    turn[fly] *= 2.5
+    edge = style.edge + (1 - style.edge) * smoothstep(0.05, 0.8, whole)
+    spread = np.clip(0.5 + 0.28 * draw(0.35, 0.5, 0.8), 0, 1)
+    length = own.scalp_length * says.length * edge
+    length = np.maximum(length * (style.shortest + (1.12 - style.shortest) * spread), 0.3)
+    deep = rng.random(count)  # where in the layer
+    height = says.height * np.clip(0.15 + 0.85 * deep + 0.16 * draw(0.8, 0.6, 0.0), 0.05, 1.3)
+    height = np.where(fly, says.height * rng.uniform(0.9, 1.9, count) + 1.0, height)
+    height *= 0.35 + 0.65 * smoothstep(0.1, 0.9, whole)
+    lift = np.radians(np.clip(style.lift_deg + 9 * draw(0.5, 0.5, 0.7), 3, 88))
+    points = style.points
+    curves = growth.grow(style, skin, eyes, p, n, sides, length, height, turn, lift, points)
+    # tufts gather in locks, strands in tufts
+    s = np.linspace(0, 1, points)
+    led, of_lock = curves[tufts], np.searchsorted(tufts, tufts[lock])
+    first_of = np.zeros(len(tufts), int)
+    first_of[own_tuft] = of_lock
+    led = growth.gather(led, p[tufts], first_of, style.gather_locks * s**1.2)
+    apiece = smoothstep(3.0, 34.0, length) if not style.coil else np.ones(count)
+    share_of = style.gather_tufts * apiece[:, None, None] * (s**0.8)[None, :, None]
+    loose = np.where(fly, 0.25, 1.0)[:, None, None]
+    apart = (p - p[tufts][own_tuft])[:, None] * (1 - 0.7 * s)[None, :, None]
+    curves += loose * share_of * (led[own_tuft] + apart - curves)
+    curves = _waved(curves, style, length, draw, rng, skin)
+    flat = curves.reshape(-1, 3)
+    keep_off = np.tile(growth.CLEAR_MM * np.minimum(8 * s, 1.0), count)
+    at, deep = skin.at(flat), np.arange(len(flat))
+    for _ in range(4):  # out of the head, along slopes that turn on the way
+        deep = deep[at[deep, 0] < keep_off[deep] - 0.02]
+        flat[deep] += (keep_off[deep] - at[deep, 0])[:, None] * at[deep, 1:]
+        at[deep] = skin.at(flat[deep])
+    curves = flat.reshape(curves.shape)
+    curves[:, 0] = p
+    width = own.width_mm * np.clip(1 + 0.13 * rng.normal(size=count), 0.6, 1.4)
+    width *= 0.6 + 0.4 * smoothstep(0.05, 0.6, whole)
+    tone = own.lightness * draw(0.35, 0.45, 0.8)
+    return {
+        **_pack(
+            curves,
+            width,
+            pigmented(own, tone, rng.random(count) < own.grey),
+            growth.covered(curves, width / share, at[:, 1:]),
+            roots.vertex,
+        ),
+        "tip": np.full(count, 0.8 if length.mean() < 15 else 0.5),
+    }
+
+
+def _waved(curves, style: Style, length, draw, rng, skin) -> np.ndarray:
+    """Waves across the strands, coils, and each strand's own wandering."""
+    count, points = curves.shape[:2]
+    s = np.linspace(0, 1, points)
+    along = np.gradient(curves, axis=1)
+    along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
+    out = skin.at(curves.reshape(-1, 3))[:, 1:].reshape(curves.shape)
+    across = np.cross(along, out)
+    across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
+    off = np.cross(across, along)
+    phase = 2 * np.pi * length[:, None] * s / style.wave_length_mm
+    phase = phase * (1 + 0.12 * draw(0.4, 0.6, 0.5))[:, None] + draw(3.0, 1.0, 0.35)[:, None]
+    size = style.wave_mm * np.clip(1 + 0.3 * draw(0.5, 0.6, 0.5), 0.2, 2.0)
+    size = size * np.minimum(length / (1.5 * style.wave_length_mm), 1.0)
+    size = size[:, None] * np.minimum(s * length[:, None] / (0.5 * style.wave_length_mm), 1.0)
+    swing = size * (np.cos(phase) - np.cos(phase[:, :1]))
+    coil = style.coil * size * (np.sin(phase) - np.sin(phase[:, :1]))
+    own = style.frizz_mm * s[:, None] * rng.normal(size=(count, 1, 3))
+    turn = rng.uniform(0, 2 * np.pi, (count, 1, 3)) + 5.0 * s[None, :, None]
+    own = own * (0.6 + np.sin(turn))
+    return curves + swing[..., None] * across + coil[..., None] * off + own
 
 
 class Projector:
@@ -193,106 +312,111 @@ class Projector:
 
 
 def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: Hair) -> list[dict]:
-    """Each brow follows an arc over its eye; hairs rise at the nose and turn outwards."""
+    """Each brow follows an arc over its eye, in two layers: short fine hairs that lie on the skin,
+    and longer ones that rise at the nose and turn outwards; those from above lean down, those from
+    below lean up, so that they meet in a ridge.
+    """
     project, out = Projector(scalp), []
     for centre in eye_centres:
         side = np.sign(centre[0])
-        u = rng.beta(1.35, 1.30, count)
-        x = -17.0 + 41.0 * u
+        under = rng.random(count) < 0.45
+        u = rng.beta(1.25, 1.20, count)
+        ragged = 0.035 * rng.normal(size=count)
+        u = np.clip(u + ragged * (u < 0.2), 0, 1.02)
+        x = own.brow_inner_mm + own.brow_length_mm * u
         arc = (
-            14.0
-            + 7.4 * np.sin(np.pi * np.clip(0.06 + 0.80 * u, 0, 1))
-            - 5.0 * smoothstep(0.74, 1.0, u)
+            own.brow_low_mm
+            + own.brow_arch_mm * np.sin(np.pi * np.clip(0.04 + 0.86 * u, 0, 1))
+            - 4.0 * smoothstep(0.70, 1.0, u)
         )
-        half = own.brow_width * 4.0 * (1 - 0.72 * smoothstep(0.35, 1.0, u))
-        half = half * smoothstep(-0.12, 0.22, u)
-        v = np.clip(rng.normal(size=count) * 0.52, -1, 1)
+        half = own.brow_half_mm * (1 - 0.70 * smoothstep(0.40, 1.0, u))
+        half = half * (0.62 + 0.38 * smoothstep(-0.05, 0.25, u))
+        wander = np.sin(9.0 * u + 2.0 * side) + 0.7 * np.sin(23.0 * u + side)
+        half = half * (1 + 0.10 * wander)
+        v = rng.normal(size=count) * np.where(rng.random(count) < 0.06, 0.95, 0.50)
+        v = np.clip(v, -1.7, 1.7)
         roots = project.roots(np.column_stack([centre[0] + side * x, centre[1] + arc + half * v]))
-        tilt = (
-            np.radians(62 * (1 - smoothstep(0.0, 0.35, u)) + 14 - 34 * smoothstep(0.55, 1.0, u))
-            - 0.35 * v
-            + 0.16 * rng.normal(size=count)
-        )
+        head = 1 - smoothstep(0.02, 0.30, u)
+        tilt = np.radians(66 * head + 20 - 44 * smoothstep(0.50, 0.95, u))
+        tilt = tilt - (0.50 * (1 - 0.7 * head)) * v + 0.17 * rng.normal(size=count)
+        tilt = tilt + 0.12 * np.sin(31.0 * u + 4.0 * v)
         flow = _tangential(
             np.column_stack([side * np.cos(tilt), np.sin(tilt), np.zeros(count)]), roots.normals
         )
-        length = (
-            rng.uniform(4.5, 8.0, count)
-            * (0.75 + 0.3 * smoothstep(0.0, 0.3, u))
-            * (1 - 0.35 * smoothstep(0.7, 1.0, u))
+        length = rng.uniform(0.62, 1.12, count) * own.brow_hair_mm
+        length = length * (0.70 + 0.30 * smoothstep(0.0, 0.25, u))
+        length = length * (1 - 0.38 * smoothstep(0.65, 1.0, u)) * np.where(under, 0.62, 1.0)
+        length = length * (1 - 0.25 * np.clip(np.abs(v) - 0.9, 0, 1))
+        lift = np.radians(np.where(under, rng.uniform(3, 10, count), rng.uniform(9, 26, count)))
+        points = straight(roots, flow, length, lift, 1.25 * lift, rng, frizz=0.07)
+        thin = np.where(under, 0.72, 1.0) * (1 - 0.35 * np.clip(np.abs(v) - 0.7, 0, 1))
+        tone = np.log(own.brow_light) + 1.1 * own.lightness * rng.normal(size=count)
+        deep = np.where(under, 0.55, 0.2)[:, None] * np.ones(POINTS)
+        packed = _pack(
+            points,
+            rng.uniform(0.050, 0.080, count) * thin,
+            pigmented(own, tone, rng.random(count) < 0.6 * own.grey),
+            deep,
+            roots.vertex,
         )
-        points = grow(
-            roots,
-            flow,
-            length,
-            np.radians(rng.uniform(10, 24, count)),
-            np.radians(np.full(count, 16.0)),
-            rng,
-            frizz=0.05,
-        )
-        out.append(
-            _pack(
-                points,
-                rng.uniform(0.045, 0.075, count),
-                np.array(own.colour) * 1.6 * np.exp(0.25 * rng.normal(size=(count, 1))),
-                np.full((count, POINTS), 0.25),
-                roots.vertex,
-            )
-        )
+        out.append({**packed, "tip": np.full(count, 0.15)})
     return out
 
 
 def stubble(scalp: Scalp, rng: np.random.Generator, count: int, own: Hair) -> dict:
-    """A day's beard."""
+    """A beard of any length: cut hairs that leave the skin at a slant, down and outwards."""
     roots = scatter_roots(scalp, scalp.column("beard") ** 1.3, count, rng)
-    flow = _tangential(
-        np.array([0, -1.0, 0.1])
-        + 0.5 * _noise(roots.points, 14, 1.0)
-        + 0.35 * rng.normal(size=roots.points.shape),
-        roots.normals,
+    p, shortest_longest = roots.points, own.stubble_mm
+    out = np.sign(p[:, 0]) * smoothstep(4.0, 40.0, np.abs(p[:, 0]))
+    flow = np.column_stack([0.45 * out, np.full(count, -1.0), np.full(count, 0.1)])
+    flow += 0.35 * _noise(p, 14, 1.0) + 0.30 * rng.normal(size=p.shape)
+    thick = roots.at(scalp.column("beard"))
+    length = rng.uniform(*shortest_longest, count) * (0.55 + 0.45 * thick)
+    flat = smoothstep(1.0, 8.0, length)
+    lift = np.radians(rng.uniform(25, 62, count)) * (1 - 0.45 * flat)
+    points = straight(
+        roots, _tangential(flow, roots.normals), length, lift, 0.9 * lift * flat, rng, frizz=0.12
     )
-    length = rng.uniform(0.35, 1.1, count)
-    points = grow(roots, flow, length, np.radians(rng.uniform(25, 60, count)), np.zeros(count), rng)
-    return _pack(
+    grey = rng.random(count) < own.grey
+    packed = _pack(
         points,
-        rng.uniform(0.05, 0.08, count),
-        np.array(own.colour) * 1.3 * np.exp(0.3 * rng.normal(size=(count, 1))),
-        np.zeros((count, POINTS)),
+        rng.uniform(0.055, 0.095, count),
+        pigmented(own, np.log(1.2) + 1.2 * own.lightness * rng.normal(size=count), grey),
+        np.clip(0.7 * flat[:, None] * (1 - np.linspace(0, 1, POINTS)), 0, 1),
         roots.vertex,
     )
+    return {**packed, "tip": np.full(count, 0.9)}
 
 
 def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int, own: Hair) -> dict:
-    """Fine pale hair on the cheeks, the ears and the forehead: seen against the light."""
+    """Fine hair of the face, the ears and the neck: seen against the light, along the contour."""
     p = scalp.positions
     density = (
         (1 - scalp.column("hair"))
         * (1 - scalp.column("lips"))
         * (1 - scalp.column("inside"))
-        * smoothstep(-130, -100, p[:, 1] - eyes[1])
+        * (1 - scalp.column("eyelid"))
+        * smoothstep(-175, -120, p[:, 1] - eyes[1])
     )
     roots = scatter_roots(scalp, density, count, rng)
-    flow = _tangential(
-        np.array([0, -1.0, -0.3])
-        + 0.4 * _noise(roots.points, 18, 7.0)
-        + 0.3 * rng.normal(size=roots.points.shape),
-        roots.normals,
-    )
-    points = grow(
+    out = np.sign(roots.points[:, 0]) * smoothstep(4.0, 40.0, np.abs(roots.points[:, 0]))
+    flow = np.column_stack([0.5 * out, np.full(count, -1.0), np.full(count, -0.3)])
+    flow += 0.4 * _noise(roots.points, 18, 7.0) + 0.3 * rng.normal(size=flow.shape)
+    lift = np.radians(rng.uniform(20, 55, count))
+    points = straight(
         roots,
-        flow,
-        rng.uniform(0.8, 2.0, count),
-        np.radians(rng.uniform(20, 50, count)),
-        np.radians(np.full(count, 20.0)),
+        _tangential(flow, roots.normals),
+        rng.uniform(*own.vellus_mm, count),
+        lift,
+        np.radians(np.full(count, 24.0)),
         rng,
+        frizz=0.10,
+        points=4,
     )
-    return _pack(
-        points,
-        np.full(count, 0.009),
-        np.tile(own.vellus_colour, (count, 1)),
-        np.zeros((count, POINTS)),
-        roots.vertex,
-    )
+    colours = np.array(own.vellus_colour) * np.exp(0.25 * rng.normal(size=(count, 1)))
+    width = own.vellus_width_mm * rng.uniform(0.8, 1.2, count)
+    packed = _pack(points, width, colours, np.zeros((count, 4)), roots.vertex)
+    return {**packed, "tip": np.full(count, 0.25)}
 
 
 def all_strands(
@@ -309,13 +433,26 @@ def all_strands(
     eyes = anatomy.landmarks["eyes"]
     balls = [ball.centre for ball in anatomy.eyes]
     parts = [
-        scalp_hair(scalp, eyes, rng, int(own.scalp * share), own),
+        *scalp_hair(scalp, eyes, rng, share, own),
         *brows(scalp, balls, rng, int(own.brows * share), own),
         *lashes.grown(anatomy, scalp.positions, scalp.faces, rng, lash, own, POINTS),
         stubble(scalp, rng, int(own.stubble * share), own),
         vellus(scalp, eyes, rng, int(own.vellus * share), own),
     ]
-    kinds = {key: np.int64 if key == "root_vertex" else np.float32 for key in parts[0]}
+    return joined(parts)
+
+
+def joined(parts: list[dict]) -> Strands:
+    """Strands of several growths: points (S, P, 3), P one for each, and cover (S, P)."""
+    counts = np.concatenate([np.full(len(p["points"]), p["points"].shape[1]) for p in parts])
+    flat = {
+        "points": [p["points"].reshape(-1, 3) for p in parts],
+        "cover": [p["cover"].ravel() for p in parts],
+        "tip": [p.get("tip", np.full(len(p["points"]), TIP)) for p in parts],
+        **{key: [p[key] for p in parts] for key in ("width_mm", "colour")},
+    }
     return Strands(
-        **{key: np.concatenate([p[key].astype(kind) for p in parts]) for key, kind in kinds.items()}
+        **{key: np.concatenate(each).astype(np.float32) for key, each in flat.items()},
+        first=np.concatenate([[0], np.cumsum(counts)]),
+        root_vertex=np.concatenate([p["root_vertex"] for p in parts]).astype(np.int64),
     )

@@ -18,7 +18,7 @@ SURFACE = ("positions", "normals", "uvs", "faces", "masks")
 PROXY = ("positions", "normals", "faces", "albedo", "masks")
 EYE = ("positions", "normals", "faces", "centre", "gaze", "radius", "iris_radius")
 EYE += ("tissue", "edges", "edges_mm", "vessels")
-STRANDS = ("points", "width_mm", "colour", "cover", "root_vertex")
+STRANDS = ("points", "first", "width_mm", "tip", "colour", "cover", "root_vertex")
 SPARSE = ("data", "indices", "indptr", "shape")
 
 

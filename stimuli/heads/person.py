@@ -8,9 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from renderer.parameters import Parameters, parameter, refuse_unknown, weights
+from renderer.errors import InputError
+from renderer.parameters import Parameters, nested, parameter, refuse_unknown, weights
 from stimuli.heads.form import Form
 from stimuli.heads.regions import Regions
+from stimuli.heads.styles import Style
 
 _COLOUR = {"unit": "linear albedo", "low": 0.0, "high": 1.0}
 
@@ -123,25 +125,77 @@ class Lashes(Parameters):
 
 @dataclass(frozen=True)
 class Hair(Parameters):
-    """Numbers of strands, the fibre's colour, and the lengths' scales; 0 strands: none."""
+    """Hair of head, brows, lids, beard and face; 0 strands: none.
+
+    colour: what two ways through a fibre leave of light, its melanin's absorption; a share `grey`
+    of the strands has none; lightness: standard deviation of the logarithm of a strand's colour.
+    style: a name of stimuli/hairstyles or a table (stimuli/heads/styles.py).
+    """
 
     called: ClassVar[str] = "hair"
 
     colour: tuple[float, float, float] = parameter(
         (0.055, 0.032, 0.019), source="dark brown, by eye", **_COLOUR
     )
-    scalp: int = parameter(78000, unit="strands", low=0, high=400000, source="by eye")
-    scalp_length: float = parameter(1.0, unit="of 4.5 to 28 mm", low=0.1, high=4.0, source="by eye")
+    grey: float = parameter(0.0, unit="share", low=0.0, high=1.0, source="by eye")
+    grey_colour: tuple[float, float, float] = parameter(
+        (0.62, 0.60, 0.56), source="by eye", **_COLOUR
+    )
+    lightness: float = parameter(0.28, low=0.0, high=1.5, source="by eye")
+    style: Style = nested(Style, default_factory=lambda: Style.read("side_part", "hair.style"))
+    scalp: int = parameter(
+        100000, unit="strands", low=0, high=250000, source="Robbins 2012, 100,000 on average"
+    )
+    width_mm: float = parameter(
+        0.072, unit="mm", low=0.01, high=0.2, source="Robbins 2012: 0.05 to 0.09"
+    )
+    scalp_length: float = parameter(
+        1.0, unit="of the style's lengths", low=0.05, high=4.0, source="by eye"
+    )
     hairline_mm: float = parameter(
         0.0, unit="mm lower on the forehead", low=-40.0, high=30.0, source="by eye"
     )
-    brows: int = parameter(820, unit="hairs a brow", low=0, high=5000, source="by eye")
-    brow_width: float = parameter(1.0, unit="of 4 mm", low=0.2, high=3.0, source="by eye")
-    stubble: int = parameter(9000, unit="hairs", low=0, high=100000, source="a day's beard")
-    vellus: int = parameter(16000, unit="hairs", low=0, high=200000, source="by eye")
+    brows: int = parameter(1250, unit="hairs a brow", low=0, high=5000, source="second trial")
+    brow_low_mm: float = parameter(
+        11.0, unit="mm above the eye's centre", low=0.0, high=40.0, source="second trial"
+    )
+    brow_arch_mm: float = parameter(5.0, unit="mm", low=-5.0, high=20.0, source="second trial")
+    brow_half_mm: float = parameter(4.4, unit="mm", low=0.5, high=12.0, source="second trial")
+    brow_inner_mm: float = parameter(
+        -18.0, unit="mm outwards of the eye's centre", low=-40.0, high=10.0, source="by eye"
+    )
+    brow_length_mm: float = parameter(43.0, unit="mm", low=10.0, high=80.0, source="by eye")
+    brow_hair_mm: float = parameter(8.0, unit="mm, longest", low=1.0, high=25.0, source="by eye")
+    brow_light: float = parameter(
+        1.25, unit="of the colour", low=0.1, high=6.0, source="lighter than the scalp's, by eye"
+    )
+    stubble: int = parameter(30000, unit="hairs", low=0, high=100000, source="second trial")
+    stubble_mm: tuple[float, float] = parameter(
+        (0.15, 0.55), unit="mm, shortest and longest", low=0.05, high=40.0, source="a day's beard"
+    )
+    vellus: int = parameter(45000, unit="hairs", low=0, high=200000, source="second trial")
+    vellus_mm: tuple[float, float] = parameter(
+        (1.0, 3.0), unit="mm, shortest and longest", low=0.1, high=10.0, source="second trial"
+    )
+    vellus_width_mm: float = parameter(
+        0.012, unit="mm", low=0.002, high=0.05, source="second trial"
+    )
     vellus_colour: tuple[float, float, float] = parameter(
         (0.22, 0.15, 0.10), source="by eye", **_COLOUR
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("stubble_mm", "vellus_mm"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise InputError(f"{self.where(name)} is {(low, high)}; expected the shorter first")
+
+    @classmethod
+    def read(cls, table: Mapping[str, Any], where: str) -> Hair:
+        if isinstance(table, Mapping) and "style" in table:
+            table = {**table, "style": Style.read(table["style"], f"{where}.style")}
+        return super().read(table, where)
 
 
 @dataclass(frozen=True)

@@ -1,38 +1,87 @@
-"""Hair: its light against a closed form, and strands that are left out because nobody sees them."""
+"""Hair: what it covers, its shadow on itself, and strands left out because nobody sees them."""
 
-from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import renderer
 from renderer.passes import occlusion
-from renderer.passes.hair import COLUMNS, EXTINCTION
-from renderer.passes.lamps import Lamps
+from renderer.passes.hair import SEGMENTS, pieces, ribbon_faces
+from renderer.scene import MASKS, Environment, Model, Proxy, Strands, Surface
+from renderer.scene.camera import Camera
+from renderer.scene.graph import SceneGraph
+from renderer.scene.lights import DistantLight
+from renderer.scene.material import Material
 
 
-def test_unshadowed_light_on_strands_is_that_of_the_layer(drawing):
-    """exp(-extinction cover / cosine) of the root's normal, and nothing where it faces away."""
-    drawing.context.make_current()
-    (hair,) = drawing.hair
-    lights = [replace(light, shadow=False) for light in drawing.lamps.lights]
-    before = hair._lit
-    try:
-        lamps = Lamps(lights, hair.points.reshape(-1, 3), 16)
-        hair.light(drawing.context, drawing.program, lamps, drawing.surroundings)
-        count = hair.points.shape[0] * hair.points.shape[1]
-        lit = hair._lit.read()[:, ::-1].reshape(len(lights), -1)[:, :count]
-        assert hair._lit.width == COLUMNS
-    finally:
-        hair._lit = before
-    normals = np.repeat(hair.normals, hair.points.shape[1], axis=0)
-    for k, light in enumerate(lights):
-        facing = normals @ light.towards
-        t = np.clip((facing + 0.35) / 0.6, 0, 1)
-        path = EXTINCTION * hair.strands.cover.ravel() / np.maximum(facing, 0.22)
-        np.testing.assert_allclose(lit[k], np.exp(-path) * t * t * (3 - 2 * t), atol=2e-5)
-    shadowed = before.read()[:, ::-1].reshape(len(lights), -1)[:, :count]
-    assert (shadowed <= lit + 2e-5).all() and shadowed.mean() < 0.9 * lit.mean()
+def stand_of(points, width_mm, back_mm=-200.0):
+    """Strands (S, P, 3) of one width before a square of 400 mm, under a lamp along +z: a graph."""
+    count = len(points)
+    corners = 200.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+    corners[:, 2] = back_mm
+    normals, faces = np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]])
+    surface = Surface(
+        corners.astype(np.float32),
+        normals.astype(np.float32),
+        np.zeros((4, 2), np.float32),
+        faces.astype(np.uint32),
+        np.zeros((4, len(MASKS)), np.float32),
+        Proxy.itself(corners, normals, faces, (0.5, 0.5, 0.5)),
+    )
+    ones = np.ones(count, np.float32)
+    strands = Strands(
+        points.reshape(-1, 3).astype(np.float32),
+        points.shape[1] * np.arange(count + 1),
+        width_mm * ones,
+        ones,
+        np.tile(np.float32([0.1, 0.06, 0.04]), (count, 1)),
+        np.zeros(points.shape[0] * points.shape[1], np.float32),
+        np.zeros(count, np.int64),
+    )
+    graph = SceneGraph(Environment((0.1, 0.1, 0.1)), subject=np.zeros(3))
+    graph.add_model(Model(surface, (), strands, {}, Material(medium="")), np.eye(4))
+    graph.add_light(DistantLight(direction=(0.0, 0.0, 1.0), irradiance=(3.0, 3.0, 3.0)))
+    return graph
+
+
+def test_what_a_thin_strand_covers_is_its_width_at_every_distance():
+    """The sum of opacity over the image is width times length, mm, where a strand is thinner than
+    a pixel and where it is thicker, at two distances; a third of the way back it is hidden.
+    """
+    x = np.linspace(-15, 15, 9)
+    points = np.stack([x, 0.31 * x, np.zeros(9)], axis=1)[None]
+    length = np.linalg.norm(points[0, -1] - points[0, 0])
+    for width in (0.03, 0.09, 2.0):
+        with renderer.Renderer(stand_of(points, width), (128, 96), 1, 0, 4, 256) as drawing:
+            for height in (60.0, 180.0):
+                camera = Camera(height_mm=height, yaw_deg=0.0, pitch_deg=0.0)
+                with drawing.frame(camera) as frame:
+                    opacity = frame.surface.textures[1].read()[..., 3]
+                covered = opacity.sum() * (height / 96) ** 2
+                assert covered == pytest.approx(width * length, rel=0.09), (width, height)
+
+
+def test_strands_shade_those_behind_them_by_what_they_cover():
+    """Light through sheets of parallel strands: each takes width / spacing of it; between the four
+    depths of the map it is blended, so that it may be off by half a sheet.
+    """
+    depth, y, x = 3.0 * np.arange(6), np.arange(-8, 8, 0.25), np.linspace(-12, 12, 7)
+    z, rows, across = np.meshgrid(depth, y, x, indexing="ij")
+    rows = rows + np.random.default_rng(2).uniform(-1, 1, rows.shape[:2])[..., None]
+    points = np.stack([across, rows, -z], axis=-1).reshape(-1, 7, 3)
+    graph, width = stand_of(points, 0.06), 0.06
+    with renderer.Renderer(graph, (64, 64), 1, rays=4, shadow_map=1024) as drawing:
+        (hair,) = drawing.hair
+        lit = hair._lit.read()[0, ::-1].reshape(-1, 2)[: len(hair.points)]
+        with drawing.frame(Camera(height_mm=60.0, yaw_deg=0.0)) as frame:
+            assert frame.surface.textures[1].read()[..., :3].max() > 0
+    middle = (np.abs(hair.points[:, :2]) < 5).all(axis=1)
+    sheets = [lit[middle & (hair.points[:, 2] == -z)] for z in depth]
+    means = np.array([np.exp(-sheet[:, 0]).mean() for sheet in sheets])
+    assert means[0] > 0.95 and (np.diff(means) < 0).all()
+    np.testing.assert_allclose(means, (1 - width / 0.25) ** np.arange(6), atol=0.1)
+    assert np.concatenate(sheets)[:, 1].min() == 1.0, "no surface stands before them"
 
 
 @pytest.mark.parametrize("framing", ["close-up", "half-length"])
@@ -93,3 +142,15 @@ def test_what_passes_the_eye_is_never_hidden():
     points = np.array([[[0, 0, -50.0], [0, 0, 5.0]], [[0, 0, -50.0], [0, 0, -60.0]]])
     hidden = occlusion.hidden(levels, points, projection, (16, 16), np.full(2, 0.1), 0.5)
     assert hidden.tolist() == [False, True]
+
+
+def test_pieces_hold_every_segment_once():
+    counts = np.array([2, 5, 6, 14])
+    first = np.concatenate([[0], np.cumsum(counts)])
+    cut = pieces(first)
+    assert cut.shape[1] == SEGMENTS + 1 and len(cut) == 1 + 1 + 2 + 4
+    faces = ribbon_faces(cut)
+    assert len(faces) == 2 * (counts - 1).sum()
+    segments = {tuple(sorted(face)) for face in (faces // 2)[:, [0, 2]]}
+    expected = {(k, k + 1) for a, b in pairwise(first) for k in range(a, b - 1)}
+    assert segments == expected

@@ -1,0 +1,107 @@
+"""Generated hair: styles as data, lengths, and strands that stay out of the head."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from renderer.scene import MASKS
+from stimuli.heads import growth, hair
+from stimuli.heads.person import Hair
+from stimuli.heads.styles import HAIRSTYLES, Style
+from stimuli.parts import names
+
+EYES = np.array([0.0, -112.0, 120.0])
+
+
+@pytest.fixture(scope="module")
+def scalp():
+    """A ball for a head, haired above its equator and behind."""
+    ball = trimesh.creation.icosphere(5, 92.0)
+    normals = np.array(ball.vertices) / 92.0
+    positions = normals * 92.0 + [0.0, -100.0, 45.0]
+    masks = np.zeros((len(positions), len(MASKS)))
+    masks[:, MASKS.index("hair")] = np.clip(0.5 + normals[:, 1] * 3 - normals[:, 2], 0, 1)
+    return hair.Scalp(positions, normals, np.array(ball.faces), masks)
+
+
+def grown(scalp, own, seed=1):
+    return hair.scalp_hair(scalp, EYES, np.random.default_rng(seed), 0.01, own)
+
+
+def off_the_ball(points):
+    return np.linalg.norm(points - [0.0, -100.0, 45.0], axis=-1) - 92.0
+
+
+@pytest.mark.parametrize("name", names(HAIRSTYLES))
+def test_every_style_stays_out_of_the_head_and_within_its_lengths(scalp, name):
+    own = Hair.read({"style": name}, "hair")
+    styled, *_ = grown(scalp, own)
+    points = styled["points"].astype(float)
+    off = off_the_ball(points)
+    assert off[:, 2:].min() > -0.35, "the ball's facets lie 0.1 mm below it, a cell is 4 mm"
+    assert np.isfinite(points).all() and 0 <= styled["cover"].min() <= styled["cover"].max() <= 1
+    steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    rows = np.array(own.style.anchors)
+    # waves and pushes make the line longer than it was grown
+    assert np.median(steps.sum(axis=1)) < 1.5 * rows[:, 2].max()
+    assert np.median(steps.sum(axis=1)) > 0.25 * rows[:, 2].min()
+
+
+def test_the_same_bytes_for_one_seed(scalp):
+    own = Hair()
+    first, again, other = (grown(scalp, own, seed)[0]["points"] for seed in (1, 1, 2))
+    assert first.tobytes() == again.tobytes() and first.tobytes() != other.tobytes()
+
+
+def test_a_parting_shows_skin_and_parts_the_strands(scalp):
+    own = Hair()
+    style = own.style
+    points = grown(scalp, own)[0]["points"]
+    near = growth.parting_nearness(style, points[:, 0], EYES) > 0.9
+    off = points[:, 0, 0] - style.part_mm
+    gap = np.abs(off) < 0.5 * style.part_gap_mm
+    assert (near & gap).sum() < 0.5 * (near & (np.abs(off) < 4)).sum() / 8 + 3
+    beside = near & (np.abs(off) < 10)
+    moved = points[:, 4, 0] - points[:, 0, 0]
+    assert moved[beside & (off < -1)].mean() < 0 < moved[beside & (off > 1)].mean()
+
+
+def test_cover_is_the_hair_outwards_of_a_point():
+    """A slab of strands along x, 12 mm thick: 1 - exp(-2 / pi of what lies above, 13 mm far)."""
+    rng = np.random.default_rng(3)
+    width, count, thick = 0.07, 6000, 12.0
+    y, z = rng.uniform(-20, 20, count), rng.uniform(0, thick, count)
+    x = np.linspace(-20, 20, 30)
+    curves = np.stack(np.broadcast_arrays(x, y[:, None], z[:, None]), axis=-1)
+    out = np.tile([0.0, 0.0, 1.0], (curves.size // 3, 1))
+    cover = growth.covered(curves, np.full(count, width), out)
+    means, expected = [], []
+    for low, high in ((1, 4), (5, 8), (9, 11)):  # cells blur by 3 mm
+        layer = (np.abs(y) < 12) & (low < z) & (z < high)
+        above = count * 40 * width / (40 * 40 * thick) * (thick - z[layer])
+        means.append(cover[layer, 15].mean())
+        expected.append((1 - np.exp(-2 / np.pi * above)).mean())
+    assert (np.diff(means) < 0).all()
+    np.testing.assert_allclose(means, expected, atol=0.25)
+
+
+def test_grey_strands_have_no_pigment():
+    own = Hair.read({"grey": 1.0, "lightness": 0.0}, "hair")
+    colours = hair.pigmented(own, np.zeros(3), np.ones(3, bool))
+    np.testing.assert_allclose(colours, np.tile(own.grey_colour, (3, 1)))
+
+
+@pytest.mark.parametrize(
+    ("style", "message"),
+    [
+        ("side_prat", "did you mean 'side_part'"),
+        ({"anchors": [[0, 1, 2]]}, "expected degrees, up, length"),
+        ({"anchors": [[0, 60, 900, 5, 1, 0, 1, 0]]}, "length is 900; expected 0 to 700"),
+        ({"anchors": [[0, 60, 20, 5, 1, 0, 0, 0]]}, "a row without a direction"),
+        ({"like": "side_part", "locks": 0}, "hair.style.locks is 0"),
+    ],
+)
+def test_a_style_that_cannot_be_is_refused(style, message):
+    with pytest.raises(ValueError, match="style") as error:
+        Style.read(style, "hair.style")
+    assert message in str(error.value)
