@@ -17,6 +17,7 @@ NECKLINE_TOP_MM, HEAD_MM = -138.0, -100.0
 BACK_Z_MM, FRONT_Z_MM = 15.0, 65.0
 DRAPE = 300  # rounds of smoothing: how widely cloth spans hollows
 SPAN_MM = 30.0  # at most
+EVENED = 60  # rounds of smoothing: how fine the body is through cloth
 SHARE = 0.45  # of the room to the next part of the body
 HIDDEN_MM = 25.0  # below the neckline: skin farther under the cloth is left out
 BAND_STEP_MM = 0.7
@@ -133,24 +134,29 @@ def _cloth(bust: Bust, own: Clothes):
     value = under(bust.plain, own)
     carry, faces, border = _clipped(bust, value)
     skin, plain = carry @ bust.positions, carry @ bust.plain
-    normals = vertex_normals(skin, faces)
     mean = _neighbours(faces, len(skin))
-    smooth = skin.copy()
-    for _ in range(DRAPE):
-        smooth = np.where(border[:, None], skin, mean @ smooth)
-    span = np.clip(((smooth - skin) * normals).sum(axis=1), 0, SPAN_MM)
+    room = _room(skin, vertex_normals(skin, faces), faces)
+    # what is fine on the body does not show through: cloth hangs over an evened one
+    body = drape = skin
+    for k in range(DRAPE):
+        drape = np.where(border[:, None], skin, mean @ drape)
+        body = drape if k < EVENED else body
+    normals = vertex_normals(body, faces)
+    for _ in range(6):
+        normals = 0.5 * normals + 0.5 * (mean @ normals)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    out = ((skin - body) * normals).sum(axis=1)
+    span = np.clip(((drape - body) * normals).sum(axis=1), 0, SPAN_MM)
     ease = own.ease_mm + span
     far = own.front_mm * (carry @ value)  # about mm below the neckline
     ease += own.loose_mm * (1 - np.exp(-((np.maximum(far, 0) / 70) ** 1.5)))
     ease += own.folds_mm * np.clip((far - 8) / 50, 0, 1) * (0.5 + 0.5 * _waves(plain))
+    ease = np.maximum(ease, out + own.ease_mm)
     for _ in range(4):
         ease = np.where(border, own.ease_mm, 0.5 * ease + 0.5 * (mean @ ease))
     # arm and chest share the room between them
-    ease = np.minimum(np.maximum(ease, own.ease_mm), SHARE * _room(skin, normals, faces))
-    for _ in range(6):
-        normals = 0.5 * normals + 0.5 * (mean @ normals)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    points = skin + ease[:, None] * normals
+    above = np.minimum(np.maximum(ease - out, own.ease_mm), np.maximum(SHARE * room, 0.3))
+    points = skin + above[:, None] * normals
     return points, vertex_normals(points, faces), faces, border, carry
 
 
