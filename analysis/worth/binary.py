@@ -190,9 +190,7 @@ def _scored(x: np.ndarray, over: np.ndarray, under: np.ndarray, link: Link) -> n
         weight = (over + under) * link.information(d)
         information = blind_filled((weight @ outer).reshape(-1, n, n))
         # h_k = weight_k x_k' I^-1 x_k; the common shift that was filled in is orthogonal to x_k
-        leverage = weight * np.einsum(
-            "ki,rij,kj->rk", x, np.linalg.inv(information), x, optimize=True
-        )
+        leverage = weight * ((x @ np.linalg.inv(information)) * x).sum(axis=2)
         return solved(information, (slope + 0.5 * leverage * link.bend(d)) @ x)
 
     n = x.shape[1]
