@@ -24,3 +24,7 @@ float from_edge(vec3 local) {
     }
     return 99.0;
 }
+
+// The share of light that comes through skin from behind: a lid holds a plate of dense tissue, the tarsus, 8 to 10 mm high in the upper one.
+uniform float tarsus;
+float through_lid(vec3 local) { return 1.0 - tarsus * (1.0 - smoothstep(3.0, 6.0, from_edge(local))); }

@@ -265,7 +265,7 @@ class Surfaces:
         for drawn in self.surfaces:
             if drawn.id:
                 through = self._through(drawn, translucency)
-                own = {**values, "model": drawn.item.pose, **through}
+                own = {**values, "model": drawn.item.pose, **through, **self._lids(drawn)}
                 program.use(**program.accepts(own))
                 drawn.mesh.draw()
 
@@ -301,11 +301,13 @@ class Surfaces:
         eyes = [eye for eye in self.eyes if eye.item.mesh == drawn.item.mesh][:2]
         eyes = [eye for eye in eyes if eye.item.primitive.eye.edges.size > 2]
         shapes = [eye.item.primitive.eye for eye in eyes]
+        material = drawn.item.primitive.material.value
         balls = [[*shape.centre, shape.radius] for shape in shapes]
         textures = [eye.maps["edges"] for eye in eyes if eye.maps]
         textures += [self._no_edges] * (2 - len(textures))
         return {
             "lid_count": len(eyes),
+            "tarsus": material.tarsus if isinstance(material, Skin) else Skin.tarsus,
             "lid_ball": np.array(balls + [[0.0, 0.0, 0.0, 1.0]] * (2 - len(balls))),
             "edges_a": textures[0],
             "edges_b": textures[1],

@@ -190,6 +190,9 @@ class Skin(Material):
     lid_margin: tuple[float, float, float] = parameter(
         (0.49, 0.27, 0.24), source="albedo of the wet rim of lids, by eye", **_SHARE
     )
+    tarsus: float = parameter(
+        0.8, source="of what comes through a lid, that its plate stops, by eye", **_SHARE
+    )
     lash_line: float = parameter(0.22, source="of light, along the lashes' roots, by eye", **_SHARE)
     lip_blood: tuple[float, float] = parameter(
         (0.034, 0.080), unit="share of blood: border, seam", low=0.0, high=0.3, source="by eye"

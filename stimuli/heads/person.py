@@ -79,7 +79,7 @@ class Eyes(Parameters):
         0.8, unit="mm above the opening's middle", low=-2.0, high=3.0, source="by eye"
     )
     lid_shade: float = parameter(
-        0.56, unit="share of light at the upper lid's edge", low=0.0, high=1.0, source="by eye"
+        0.5, unit="share of light at the upper lid's edge", low=0.0, high=1.0, source="by eye"
     )
     lid_shade_mm: float = parameter(
         2.4, unit="mm, over which it falls by e", low=0.2, high=10.0, source="by eye"
