@@ -9,6 +9,7 @@ VERBS = {
     "render": "app.commands.render",
     "techniques": "app.commands.techniques",
     "head": "app.commands.head",
+    "person": "app.commands.person",
     "compare": "app.commands.compare",
     "experiment": "app.commands.experiment",
     "build": "app.commands.build",

@@ -122,10 +122,12 @@ def said_of_scan(command: Callable) -> Callable:
 
 
 def head(default: str | None, what: str) -> Callable:
-    """--head and what may be said of a scan: the command gets `head` and `said`."""
+    """--head (or --identity) and what may be said of a scan: the command gets `head` and `said`."""
 
     def decorate(command: Callable) -> Callable:
-        option = click.option("--head", default=default, show_default=bool(default), help=what)
+        option = click.option(
+            "--head", "--identity", "head", default=default, show_default=bool(default), help=what
+        )
         return option(said_of_scan(command))
 
     return decorate

@@ -26,7 +26,7 @@ from analysis.files import replacing
 from analysis.manifest import WHOLE
 from stimuli import manifest, records, sources
 from stimuli.errors import InputError
-from stimuli.parts import PEOPLE
+from stimuli.parts import PEOPLE, person_table
 from stimuli.scenes import MAP_ENDING
 from stimuli.study import FRAMING, Cell, Render
 
@@ -245,18 +245,25 @@ def _source(module: str) -> str:
 
 
 def own_files(scene: Any) -> list[list[str]]:
-    """The user's files and the people in a scene, each with its sha256."""
+    """The user's files and the people in a scene, each with its sha256; of a person that a seed
+    draws, that of their table.
+    """
+    drawn = []
     files = [getattr(thing, "file", "") for thing in scene.objects.values()]
     files += [
         file for material in scene.materials.values() for file in _maps(material.plain()).values()
     ]
     files.append(scene.environment.map)
     for thing in scene.objects.values():
-        if person := getattr(thing, "person", ""):
+        person = getattr(thing, "person", "")
+        if person.isdigit():
+            table = json.dumps(person_table(person), sort_keys=True)
+            drawn.append([f"person {person}", hashlib.sha256(table.encode()).hexdigest()])
+        elif person:
             known = PEOPLE / f"{person}.toml"
             files.append(str(known) if known.is_file() else person)
     paths = [Path(file) for file in files if file]
-    return [[path.name, manifest.sha256(path)] for path in paths if path.is_file()]
+    return drawn + [[path.name, manifest.sha256(path)] for path in paths if path.is_file()]
 
 
 def _maps(material: dict) -> dict[str, str]:

@@ -36,6 +36,15 @@ def part(name: str | Path, folder: Path, what: str, beside: Path | None = None) 
     return folder / f"{path.name}.toml"
 
 
+def person_table(name: str) -> dict[str, Any]:
+    """The table of a person: one of stimuli/people by name, a file, or a seed, which draws one."""
+    if isinstance(name, str) and name.isascii() and name.isdigit():
+        from stimuli.heads.identity import draw
+
+        return draw(int(name))
+    return read_toml(part(name, PEOPLE, "person"))
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))

@@ -429,13 +429,15 @@ def load_study(path: str | Path) -> Study:
 
 
 def with_head(scene: dict, name: str, said: Mapping[str, Any] | None = None) -> dict:
-    """The scene with another head: "default" for its own, a person by name, or a scan's file.
+    """The scene with another head: "default" for its own, a person by name, by a .toml file or by
+    a seed that draws one, or a scan's file.
 
     said: of a scan, `renderer.scene.objects.Scan`'s fields, and `albedo` and `normal` (images) and
     `skin` (a person) for what its file lacks; None values say nothing.
     """
     said = {key: value for key, value in (said or {}).items() if value is not None}
-    if not Path(name).suffix and said:
+    is_scan = Path(name).suffix not in ("", ".toml")
+    if not is_scan and said:
         raise InputError(
             f"{', '.join(sorted(said))} is for a scan's file, and the head is {name!r}"
         )
@@ -445,7 +447,7 @@ def with_head(scene: dict, name: str, said: Mapping[str, Any] | None = None) -> 
     own = scene.get("objects", {}).get(subject, {})
     place = {key: own[key] for key in ("position_mm", "rotation_deg", "scale") if key in own}
     materials = dict(scene.get("materials", {}))
-    if Path(name).suffix:
+    if is_scan:
         looks = {f"{key}_map": said.pop(key) for key in ("albedo", "normal") if key in said}
         if "skin" in said:
             skin = {"kind": "skin", **person_table(said.pop("skin")).get("skin", {})}

@@ -72,7 +72,9 @@ def _writable(path: Path, suffixes: tuple[str, ...]) -> None:
     "camera.yaw_deg=0, lights.rim=false; repeat for more."
 )
 @drawing.head(
-    "default", "The scene's own head, a person by name, or a scan: .glb, .gltf, .obj, .ply, .stl."
+    "default",
+    "The scene's own head, a person by name, .toml file or seed, or a scan: .glb, .gltf, .obj, "
+    ".ply, .stl.",
 )
 @drawing.supersample(2, "Samples a pixel")
 @drawing.seed("hair, skin noise and baked light")

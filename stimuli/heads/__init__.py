@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from renderer.scene import Model
 from renderer.scene.objects import Scan
-from stimuli.parts import PEOPLE, part, read_toml
+from stimuli.parts import person_table
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Head:
 
 
 def load_person(name_or_path: str = "man", seed: int = 0, dressed: bool = True) -> Head:
-    """A generated person: one of stimuli/people by name, or a TOML file of one's own.
+    """A generated person: one of stimuli/people by name, a TOML file of one's own, or a seed.
 
     seed: of the generated hair; dressed: in the person's clothes, if any. The base data
     are fetched on first use. Raises stimuli.errors.InputError for a person that cannot be made, and
@@ -33,16 +34,16 @@ def load_person(name_or_path: str = "man", seed: int = 0, dressed: bool = True) 
     from stimuli.heads.kept import person_model
     from stimuli.heads.person import Person
 
-    path = part(name_or_path, PEOPLE, "person")
-    person = Person.read(read_toml(path), path.stem)
+    name = Path(name_or_path).stem
+    person = Person.read(person_table(name_or_path), name)
     if not dressed:
         person = replace(person, clothes=replace(person.clothes, kind="none"))
     origin = {
-        "person": path.stem,
+        "person": name,
         "data": f"{fetch.PACKAGE} {fetch.VERSION}",
         "sha256": fetch.SHA256,
     }
-    return Head(path.stem, person_model(person, seed), origin, [fetch.LICENCE])
+    return Head(name, person_model(person, seed), origin, [fetch.LICENCE])
 
 
 def load_scan(scan: Scan) -> Head:

@@ -231,14 +231,17 @@ class Clothes(Parameters):
 class Person(Parameters):
     """A person.
 
-    targets: weight of each of MakeHuman's morph targets, by its path below targets/; arm_drop_deg:
-    how far the arms hang down; torso_yaw_deg, torso_roll_deg: how far the torso is turned below a
-    head that looks along +z; clothes: worn where a scene shows them dressed; skin: what their skin
-    says over renderer.scene.Skin's defaults (read with the scene's materials).
+    about: who it is, in words; exposure: the factor of a picture's exposure when they are its
+    subject; targets: weight of each of MakeHuman's morph targets, by its path below targets/;
+    arm_drop_deg: how far the arms hang down; torso_yaw_deg, torso_roll_deg: how far the torso is
+    turned below a head that looks along +z; clothes: worn where a scene shows them dressed; skin:
+    what their skin says over renderer.scene.Skin's defaults, read with the scene's materials.
     """
 
     called: ClassVar[str] = "person"
 
+    about: str = ""
+    exposure: float = parameter(1.0, low=0.05, high=20.0, source="as for light skin")
     targets: dict[str, float] = field(default_factory=dict)
     form: Form = field(default_factory=Form)
     arm_drop_deg: float = parameter(32.0, unit="degrees", low=0.0, high=80.0, source="by eye")
@@ -263,12 +266,16 @@ class Person(Parameters):
     def read(cls, table: Mapping[str, Any], where: str) -> Person:
         refuse_unknown(table, cls.names(), where)
         targets = weights(f"{where}.targets", table.get("targets", {}), "weights", -1, 1.5)
-        pose = ("arm_drop_deg", "torso_yaw_deg", "torso_roll_deg")
-        posed = super().read({k: v for k, v in table.items() if k in pose}, where)
+        own = ("about", "exposure", "arm_drop_deg", "torso_yaw_deg", "torso_roll_deg")
+        said = super().read({k: v for k, v in table.items() if k in own}, where)
         return cls(
+            said.about,
+            said.exposure,
             targets,
             Form.read(table.get("form", {}), f"{where}.form"),
-            *(getattr(posed, name) for name in pose),
+            said.arm_drop_deg,
+            said.torso_yaw_deg,
+            said.torso_roll_deg,
             Clothes.read(table.get("clothes", {}), f"{where}.clothes"),
             Eyes.read(table.get("eyes", {}), f"{where}.eyes"),
             Hair.read(table.get("hair", {}), f"{where}.hair"),

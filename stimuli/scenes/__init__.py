@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stimuli.errors import InputError
-from stimuli.parts import LIGHTS, PEOPLE, SCENES, part, read_toml
+from stimuli.parts import LIGHTS, SCENES, part, person_table, read_toml
 
 if TYPE_CHECKING:
     from renderer.scene import Scene
@@ -92,7 +92,23 @@ def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
                 own = _own_medium(entry)
         objects[name] = {**entry, "material": name}
         materials[name] = merge(own, materials.get(name, {}))
-    return {**table, "objects": objects, "materials": materials}
+    table = {**table, "objects": objects, "materials": materials}
+    return _exposed(table, where)
+
+
+def _exposed(table: dict[str, Any], where: str) -> dict[str, Any]:
+    """The table with its picture's exposure times that of the person whom the camera looks at."""
+    from renderer.scene import Picture
+
+    objects, picture = table["objects"], table.get("picture", {})
+    entry = objects.get(table.get("subject", next(iter(objects), "")), {})
+    if not isinstance(entry, Mapping) or entry.get("shape") != "person":
+        return table
+    factor = person_table(entry.get("person", "man")).get("exposure", 1.0)
+    if not isinstance(picture, Mapping) or factor == 1.0 or not isinstance(factor, int | float):
+        return table
+    exposure = Picture.read(picture, f"{where}.picture").exposure
+    return {**table, "picture": {**picture, "exposure": exposure * factor}}
 
 
 def framings(table: Mapping[str, Any]) -> list[str]:
@@ -135,11 +151,6 @@ def _own_medium(entry: Mapping[str, Any]) -> dict[str, Any]:
 
     medium = gltf.medium(Source(file), unit)
     return {} if medium is None else {"medium": medium}
-
-
-def person_table(name_or_path: str) -> dict[str, Any]:
-    """The table of a person: one of stimuli/people by name, or a file."""
-    return read_toml(part(name_or_path, PEOPLE, "person"))
 
 
 def stage(scene: Scene, seed: int = 0) -> Stage:
