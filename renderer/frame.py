@@ -16,6 +16,7 @@ from renderer.optics.transmittance import Translucency
 from renderer.passes import occlusion
 from renderer.passes.composite import composite
 from renderer.passes.given import draw_given
+from renderer.passes.lens import Confusion, through_lens
 from renderer.passes.pieces import Piece, pieces
 from renderer.passes.surfaces import FORMATS
 from renderer.scene.lights import PointLight
@@ -54,8 +55,11 @@ class Frame:
     times supersample.
     """
 
-    def __init__(self, renderer: Renderer, view: View, picture: Picture):
+    def __init__(
+        self, renderer: Renderer, view: View, picture: Picture, lens: Confusion | None = None
+    ):
         self.renderer, self.view, self.picture = renderer, view, picture
+        self.lens = lens
         s = renderer.supersample
         self.width, self.height = renderer.size[0] * s, renderer.size[1] * s
         self.whole = Piece(0, self.height, 0, self.height)
@@ -261,13 +265,14 @@ class Frame:
         r = self.renderer
         r.context.make_current()
         s = r.supersample
-        image = np.empty((self.height // s, self.width // s, 3), np.uint8)
+        kind = np.float32 if self.lens else np.uint8
+        image = np.empty((self.height // s, self.width // s, 3), kind)
         samples = np.empty((self.height, self.width), np.uint16)
         contrast = np.empty(samples.shape, np.float32) if technique.measures_contrast else None
         for piece in self.pieces(technique):
             with self.scatter(technique, piece) as scattered:
                 light, info = scattered.textures
-                image[piece.image_rows(self.height, s)] = self.develop(light, technique, piece)
+                image[piece.image_rows(self.height, s)] = self._developed(light, technique, piece)
                 counts = info.read()[piece.own_rows()]
             rows = piece.image_rows(self.height)
             samples[rows] = np.rint(counts[..., 0])
@@ -275,18 +280,34 @@ class Frame:
                 contrast[rows] = counts[..., 1]
             del counts
             give_back()
+        if self.lens:
+            image = _rounded(self._through_lens(image))
         return Result(image, samples, contrast)
 
     def develop(
         self,
         scattered: gl.Texture,
         technique: Technique,
-        piece: Piece | None = None,
         rounded: bool = True,
     ) -> np.ndarray:
-        """The image (H, W, 3) sRGB of light that a technique has scattered, or a piece: uint8, or
-        float32 in [0, 1] before it is rounded.
+        """The image (H, W, 3) sRGB of light that a technique has scattered: uint8, or float32 in
+        [0, 1] before it is rounded.
         """
+        pixels = self._developed(scattered, technique, self.whole, rounded=False)
+        if self.lens:
+            pixels = self._through_lens(pixels)
+        return _rounded(pixels) if rounded else pixels
+
+    def _through_lens(self, pixels: np.ndarray) -> np.ndarray:
+        r = self.renderer
+        given = (pixels, self.surface, self.lens, self.picture.grain, r.supersample)
+        return through_lens(r.context, r.program, *given)
+
+    def _developed(
+        self, scattered: gl.Texture, technique: Technique, piece: Piece, rounded: bool = True
+    ) -> np.ndarray:
+        """The rows of a piece as sRGB; where there is a lens, in linear display light for it."""
+        linear = self.lens is not None
         r, bare, dimmed = self.renderer, None, None
         if technique.specular_white is not None:
             bare = self._bare_specular() if r.hair else None
@@ -305,10 +326,11 @@ class Frame:
             technique.diffuse == "conserving",
             piece,
             dimmed,
+            linear,
         )
         if bare:
             bare.delete()
-        return np.rint(pixels * 255).astype(np.uint8) if rounded else pixels
+        return _rounded(pixels) if rounded and not linear else pixels
 
     def _bare_specular(self) -> gl.Target:
         """Surfaces once more: textures[1] is specular light without hair. The caller frees it."""
@@ -387,6 +409,10 @@ class Frame:
             target.delete()
         self._shaded.clear()
         self._transmitted.clear()
+
+
+def _rounded(pixels: np.ndarray) -> np.ndarray:
+    return np.rint(pixels * 255).astype(np.uint8)
 
 
 def _light(technique: Technique) -> dict:

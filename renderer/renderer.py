@@ -16,6 +16,7 @@ from renderer.optics.transmittance import Translucency
 from renderer.passes.environment import Surroundings
 from renderer.passes.hair import Hair
 from renderer.passes.lamps import LEAST_MM, Lamps
+from renderer.passes.lens import confusion
 from renderer.passes.points import Points
 from renderer.passes.surfaces import PLACED_FORMATS, Drawn, Surfaces
 from renderer.scene import graph as graphs
@@ -140,7 +141,8 @@ class Renderer:
         else:
             view = resolve(camera, self.subject, width, height)
         picture = picture or getattr(self.scene, "picture", None) or Picture()
-        return Frame(self, view, picture)
+        lens = confusion(camera, self.size[1]) if camera is not None else None
+        return Frame(self, view, picture, lens)
 
     def placed(
         self,

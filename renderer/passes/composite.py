@@ -27,13 +27,15 @@ def composite(
     conserving: bool = False,
     piece: Piece | None = None,
     dimmed: tuple[gl.Texture, float] | None = None,
+    linear: bool = False,
 ) -> np.ndarray:
     """The image (H, W, 3) float32 sRGB in [0, 1] of scattered irradiance over a frame's buffers, or
     the rows of it that are right in a piece.
 
     texturing: the power of the albedo that scattered light has already been multiplied by;
     conserving: the face holds back what it reflects inside; dimmed: specular light without hair and
-    the luminance of scattered light at which it is whole, None where it always is.
+    the luminance of scattered light at which it is whole, None where it always is; linear: display
+    light before it is encoded, for the lens.
     """
     width, height = surface.width, surface.height
     piece = piece or Piece(0, height, 0, height)
@@ -76,6 +78,7 @@ def composite(
                 colour_map=colour.textures[0],
                 factor=supersample,
                 grain=picture.grain,
+                linear=float(linear),
                 first_row=piece.low // supersample,
             )
             gl.draw_fullscreen(context)

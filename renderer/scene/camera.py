@@ -18,6 +18,8 @@ class Camera(Parameters):
 
     `target_mm` is relative to the subject: the midpoint of a head's eyes, or an object's centre.
     `yaw_deg` turns the camera about the target towards the person's left, `pitch_deg` lifts it.
+    With an `f_number` it has a lens: what is not at the distance of the target less `focus_mm` is
+    blurred as on a sensor `sensor_mm` high; 0 is a pinhole.
     `region` is the part of the image that the study is about, as left, top, right, bottom in
     [0, 1]: what a page shows where the whole does not fit, and what metrics look at.
     """
@@ -34,6 +36,11 @@ class Camera(Parameters):
     fov_y_deg: float = parameter(
         16.0, unit="degrees", low=0.5, high=150.0, source="a portrait lens of 85 mm"
     )
+    f_number: float = parameter(0.0, low=0.0, high=64.0, source="0: everything is sharp")
+    focus_mm: float = parameter(
+        0.0, unit="mm nearer than the target", low=-1e4, high=1e4, source="the target's distance"
+    )
+    sensor_mm: float = parameter(24.0, unit="mm", low=1.0, high=200.0, source="35 mm film")
     region: tuple[float, float, float, float] = parameter(
         (0.0, 0.0, 1.0, 1.0), unit="of the image", low=0.0, high=1.0, source="the whole image"
     )
