@@ -18,7 +18,7 @@ def test_the_thesis_scene_reads_back():
     scene = scenes.read_scene(THESIS)
     assert list(scene.lights) == ["key", "rim"] and len(scene.environment.panels) == 6
     assert scene.objects["head"].material == "head" and isinstance(scene.materials["head"], Skin)
-    assert scene.camera == FRAMINGS["head-shot"] and scene.picture.exposure == 0.76
+    assert scene.camera == FRAMINGS["head-shot"] and scene.picture.exposure == 1.45
     assert Scene.read(scene.plain()) == scene
 
 
