@@ -68,7 +68,7 @@ def test_a_scene_has_framings_of_its_own():
         assert made.framing == name and made.height_mm == camera["height_mm"]
     turned = {"camera": {"framing": "ear", "angle": "front", "fov_y_deg": 30.0}}
     camera = scenes.read_scene(scenes.merge(portrait, turned)).camera
-    assert (camera.yaw_deg, camera.fov_y_deg, camera.height_mm) == (0.0, 30.0, 120.0)
+    assert (camera.yaw_deg, camera.fov_y_deg, camera.height_mm) == (0.0, 30.0, 100.0)
 
 
 @pytest.mark.parametrize("wrong", [3, {"near": 3}, {"near": {"yaw": 1.0, "height_mm": 1.0}}])
