@@ -73,8 +73,12 @@ def draw(seed, sex, age, tone, ancestry, apart, out) -> None:
     help="The picture to write: .png or .jpg.",
 )
 @click.option("--scene", default="portrait", show_default=True, help="The scene they stand in.")
-@click.option("--technique", "-t", default="golubev", show_default=True)
-@click.option("--columns", type=click.IntRange(1, 20), default=4, show_default=True)
+@click.option(
+    "--technique", "-t", default="golubev", show_default=True, help="What scatters light in them."
+)
+@click.option(
+    "--columns", type=click.IntRange(1, 20), default=4, show_default=True, help="People a row."
+)
 @drawing.patches("A value over the scene's, by its dotted key; repeat for more.")
 @drawing.size("480x600", "each picture")
 @drawing.supersample(2, "Samples a pixel")

@@ -150,8 +150,11 @@ def draw(seed: int, bounds: Bounds | None = None) -> dict[str, Any]:
             "weaker": ("left", "right")[rng.integers(2)],
             "seed": int(rng.integers(2**31)),
         },
+        "torso_yaw_deg": _rounded(rng.uniform(-14, 14), 1),
+        "clothes": {"colour": _cloth(rng), "power": _rounded(rng.uniform(1.4, 2.4), 2)},
         "eyes": eyes,
         "hair": hair,
+        "lashes": _lashes(rng, sex),
         "skin": skin_table,
     }
 
@@ -240,7 +243,7 @@ def _eyes(rng: np.random.Generator, light: float, tone: float, age: float) -> di
     iris, fibres, collarette, *_ = _IRISES[_choice(rng, names, odds)]
     scale = rng.uniform(0.85, 1.15)
     yellow = 0.35 * tone + 0.25 * np.clip((age - 40) / 40, 0, 1)
-    sclera = np.array([0.50, 0.445, 0.415]) * (1 - yellow * np.array([0.38, 0.46, 0.55]))
+    sclera = np.array([0.47, 0.405, 0.385]) * (1 - yellow * np.array([0.38, 0.46, 0.55]))
     colours = {"iris": iris, "fibres": fibres, "collarette": collarette}
     table: dict[str, Any] = {
         name: [_rounded(scale * v, 4) for v in value] for name, value in colours.items()
@@ -249,6 +252,21 @@ def _eyes(rng: np.random.Generator, light: float, tone: float, age: float) -> di
         "iris_mm": _rounded(rng.normal(5.9, 0.12), 2),
         "sclera": [_rounded(v) for v in sclera],
     }
+
+
+def _lashes(rng: np.random.Generator, sex: str) -> dict[str, Any]:
+    longer = 1.12 if sex == "female" else 1.0
+    return {
+        "upper": int(rng.uniform(120, 175)),
+        "upper_mm": _rounded(longer * rng.uniform(6.2, 7.8), 2),
+        "lower_mm": _rounded(longer * rng.uniform(3.6, 4.6), 2),
+    }
+
+
+def _cloth(rng: np.random.Generator) -> list[float]:
+    """Linear albedo of dark cloth, a little blue, green or red."""
+    dark = rng.uniform(0.012, 0.06)
+    return [_rounded(dark * rng.uniform(0.8, 1.25), 4) for _ in range(3)]
 
 
 def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dict[str, Any]:
@@ -262,7 +280,6 @@ def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dic
         "style": _style(rng, sex, age, ancestry[0]),
         "brows": int(rng.uniform(900, 1500) * (1.0 if sex == "male" else 0.75)),
         "brow_half_mm": _rounded(rng.normal(4.3 if sex == "male" else 3.2, 0.4), 2),
-        "lashes": _rounded(rng.uniform(0.85, 1.05) if sex == "male" else rng.uniform(1.0, 1.25)),
         "stubble": int(rng.uniform(8000, 40000)) if sex == "male" else 0,
     }
     pale = 1 - tone

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -268,18 +268,19 @@ class Person(Parameters):
         targets = weights(f"{where}.targets", table.get("targets", {}), "weights", -1, 1.5)
         own = ("about", "exposure", "arm_drop_deg", "torso_yaw_deg", "torso_roll_deg")
         said = super().read({k: v for k, v in table.items() if k in own}, where)
-        return cls(
-            said.about,
-            said.exposure,
-            targets,
-            Form.read(table.get("form", {}), f"{where}.form"),
-            said.arm_drop_deg,
-            said.torso_yaw_deg,
-            said.torso_roll_deg,
-            Clothes.read(table.get("clothes", {}), f"{where}.clothes"),
-            Eyes.read(table.get("eyes", {}), f"{where}.eyes"),
-            Hair.read(table.get("hair", {}), f"{where}.hair"),
-            Lashes.read(table.get("lashes", {}), f"{where}.lashes"),
-            Regions.read(table.get("regions", {}), f"{where}.regions"),
-            dict(table.get("skin", {})),
-        )
+        parts = {
+            name: kind.read(table.get(name, {}), f"{where}.{name}") for name, kind in _PARTS.items()
+        }
+        own_skin = dict(table.get("skin", {}))
+        return replace(said, targets=targets, skin=own_skin, **parts)
+
+
+#: The tables of a person's file.
+_PARTS: dict[str, type[Parameters]] = {
+    "form": Form,
+    "clothes": Clothes,
+    "eyes": Eyes,
+    "hair": Hair,
+    "lashes": Lashes,
+    "regions": Regions,
+}

@@ -41,7 +41,7 @@ def test_drawn_people_are_people_within_bounds():
 
 
 def test_bounds_narrow_who_is_drawn():
-    bounds = Bounds("female", (60.0, 65.0), (0.8, 0.9), 0.0)
+    bounds = Bounds("female", (60.0, 65.0), (0.8, 0.9), apart=0.0)
     table = draw(1, bounds)
     person = Person.read(table, "drawn")
     assert 60 <= person.form.age_years <= 65 and person.hair.stubble == 0
