@@ -46,11 +46,13 @@ class Body:
 @dataclass(frozen=True)
 class Baked:
     """light (N, 3, 3): vector irradiance, [vertex, channel, xyz]; openness (N,): the
-    cosine-weighted share of rays that leave.
+    cosine-weighted share of rays that leave; sky (N, 3): the mean direction of those, as long as
+    they are of one mind.
     """
 
     light: np.ndarray
     openness: np.ndarray
+    sky: np.ndarray
 
 
 def hemisphere(n: int) -> np.ndarray:
@@ -124,10 +126,11 @@ def _borrowed(baked: Baked, own: Body) -> Baked:
     if not len(borrows) or not len(lends):
         return baked
     _, nearest = cKDTree(own.positions[lends]).query(own.positions[borrows])
-    light, openness = baked.light.copy(), baked.openness.copy()
+    light, openness, sky = baked.light.copy(), baked.openness.copy(), baked.sky.copy()
     light[borrows] = share * baked.light[lends[nearest]]
     openness[borrows] = share * baked.openness[lends[nearest]]
-    return Baked(light, openness)
+    sky[borrows] = baked.sky[lends[nearest]]
+    return Baked(light, openness, sky)
 
 
 def body(item: Item, eyes: Sequence[Item] = ()) -> Body:
@@ -270,7 +273,9 @@ class Tracer:
             radiance = np.where(h[..., None] < 0, radiance, sent[h])
             cosine = np.maximum(np.einsum("nri,ni->nr", d, normals[part]), 1e-3)
             light[part] = np.pi * np.einsum("nrc,nri,nr->nci", radiance, d, 1 / cosine) / rays
-        return Baked(light, (hits < 0).mean(axis=1))
+        free = hits < 0
+        sky = np.einsum("nri,nr->ni", directions, free.astype(np.float32))
+        return Baked(light, free.mean(axis=1), sky / np.maximum(free.sum(axis=1), 1)[:, None])
 
 
 def _smooth(values: np.ndarray, faces: np.ndarray, rounds: int) -> np.ndarray:
@@ -323,11 +328,13 @@ def bake(
     parts = []
     for k, body in enumerate(bodies):
         piece = slice(start[k], start[k + 1])
-        own = _borrowed(Baked(baked.light[piece], baked.openness[piece]), body)
+        own = Baked(baked.light[piece], baked.openness[piece], baked.sky[piece])
+        own = _borrowed(own, body)
         parts.append(
             Baked(
                 _smooth(own.light, body.faces, body.smooth),
                 _smooth(own.openness, body.faces, body.smooth),
+                _smooth(own.sky, body.faces, body.smooth),
             )
         )
     return parts

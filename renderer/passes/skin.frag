@@ -314,6 +314,20 @@ float goes_in_even(float nv, float m) {
 #endif
 }
 
+#ifndef DIFFUSE_ONLY
+// The share of a lobe of slope m about r that the open sky takes in: two cones' common solid angle (Oat and Sander 2007, "Ambient
+// aperture lighting", doi:10.1145/1230100.1230111) over the lobe's, whose cone is that of Jimenez et al. 2016, "Practical real-time strategies
+// for accurate indirect occlusion". A cone about the normal of half angle a lets a share sin(a)^2 of even light in.
+float taken_in(vec3 r, float m) {
+    float open = asin(sqrt(clamp(open_sky, 0.0, 1.0))), wide = acos(exp2(-3.32193 * m * m));
+    float length2 = dot(sky, sky);
+    float apart = length2 > 1e-8 ? acos(clamp(dot(r, sky) * inversesqrt(length2), -1.0, 1.0)) : 0.0;
+    float least = min(open, wide), more = max(open, wide);
+    float share = 1.0 - smoothstep(0.0, 1.0, (apart - (more - least)) / max(2.0 * least, 1e-4));
+    return share * (1.0 - cos(least)) / max(1.0 - cos(wide), 1e-6);
+}
+#endif
+
 void main() {
 #if DOMAIN == POINTS
     if (!take_place()) discard;
@@ -414,12 +428,12 @@ void main() {
         }
     }
 #ifndef DIFFUSE_ONLY
-    // the environment in the mirror's direction through each lobe, shadowed by the baked openness
+    // the environment in the mirror's direction through each lobe, as far as the cone of open sky takes it in
     vec3 r = reflect(-v, mirror);
     float mv = max(dot(mirror, v), 0.02);
     for (int k = 0; k < 2; ++k) {
         float rough = k == 0 ? lobes.x : lobes.y;
-        float occlusion = clamp(pow(nv + open_sky, exp2(-16.0 * rough - 1.0)) - 1.0 + open_sky, 0.0, 1.0);  // Lagarde and de Rousiers 2014
+        float occlusion = taken_in(r, rough);
         float back = dot(vec2(normal_f0, 1.0), face(mv, rough).xy);
         specular += (k == 0 ? 1.0 - second : second) * environment(r, 2.0 / (rough * rough)) * back * shown * occlusion;
     }

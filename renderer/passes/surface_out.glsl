@@ -13,6 +13,7 @@ uniform mat4 model;
 #include "passes/points.glsl"
 #else
 in vec3 world; in vec3 local; in vec3 world_normal; in vec2 uv; in vec4 a; in vec4 b; in mat3 light; in float open_sky; in float scatters;
+in vec3 sky;
 in float view_depth;
 #endif
 

@@ -133,8 +133,10 @@ class Surfaces:
         material: Material = part.material.value
         light = part.proxy.to_full @ baked.light.reshape(-1, 9)
         openness = part.proxy.to_full @ baked.openness[:, None]
+        sky = part.proxy.to_full @ baked.sky
         scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
-        mesh = gl.Mesh(_attributes(part, part.masks, light, openness, scatters), part.faces)
+        attributes = _attributes(part, part.masks, light, openness, scatters) | {9: sky}
+        mesh = gl.Mesh(attributes, part.faces)
         number = 0
         if material.scatters and np.any(scatters):
             medium = material.layered()
@@ -142,7 +144,8 @@ class Surfaces:
                 self.media.append(medium)
             number = 1 + self.media.index(medium)
         maps = {name: _map(part.material.maps.get(name)) for name in MAPS}
-        return Drawn(item, mesh, Baked(light.reshape(-1, 3, 3), openness[:, 0]), number, maps)
+        whole = Baked(light.reshape(-1, 3, 3), openness[:, 0], sky)
+        return Drawn(item, mesh, whole, number, maps)
 
     def curve(self, medium: int) -> Curve:
         """The reference curve of a medium by its id; of the default skin where none scatters."""
@@ -396,7 +399,7 @@ class Surfaces:
             scatters = np.ones(len(part.positions)) if part.scatters is None else part.scatters
             light, openness = drawn.baked.light.reshape(-1, 9), drawn.baked.openness[:, None]
             attributes = _attributes(part, part.masks, light, openness, scatters)
-            drawn.lists = SurfaceLists(attributes, part.faces)
+            drawn.lists = SurfaceLists(attributes | {9: drawn.baked.sky}, part.faces)
         return Points(drawn.lists, faces, weights, columns)
 
 
@@ -410,11 +413,12 @@ def _baked(
 
     def make() -> caches.Arrays:
         made = bake(bodies, lights, surroundings.radiance, rays, seed)
-        light = {f"light_{k}": one.light for k, one in enumerate(made)}
-        return light | {f"openness_{k}": one.openness for k, one in enumerate(made)}
+        kept = enumerate(vars(one) for one in made)
+        return {f"{name}_{k}": value for k, one in kept for name, value in one.items()}
 
     arrays = caches.kept("light", key, make)
-    return [Baked(arrays[f"light_{k}"], arrays[f"openness_{k}"]) for k in range(len(bodies))]
+    names = Baked.__dataclass_fields__
+    return [Baked(*(arrays[f"{name}_{k}"] for name in names)) for k in range(len(bodies))]
 
 
 def _local(material: Shading) -> dict:

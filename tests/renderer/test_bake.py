@@ -64,6 +64,24 @@ def test_skin_lights_skin_and_colours_its_shadow():
     np.testing.assert_allclose(black.light, 0, atol=1e-12)
 
 
+def test_the_open_sky_leans_away_from_a_wall():
+    """A floor before a wall sees the sky away from it; without one, along its normal, 2/3 long."""
+    floor = trimesh.creation.box((400, 4, 100)).subdivide().subdivide().subdivide()
+    wall = trimesh.creation.box((4, 120, 400))
+    wall.apply_translation((-202, 60, 0))
+    alone, normals = bake(floor)
+    walled, _ = bake(trimesh.util.concatenate([floor, wall]))
+    middle = (normals[:, 1] > 0.999) & (np.abs(floor.vertices[:, 2]) < 30)
+    lean = walled.sky[: len(normals)] - alone.sky
+    near, far = (
+        lean[middle & side] for side in (floor.vertices[:, 0] < -90, floor.vertices[:, 0] > 90)
+    )
+    assert near[:, 0].mean() > 0.15 and np.abs(near[:, 2].mean()) < 0.03
+    assert np.abs(far.mean(axis=0)).max() < 0.04
+    inner = middle & (np.abs(floor.vertices[:, 0]) < 60)
+    np.testing.assert_allclose(alone.sky[inner].mean(axis=0), [0, 2 / 3, 0], atol=0.03)
+
+
 def test_the_bake_repeats_for_one_seed():
     mesh = trimesh.creation.icosphere(2, 50.0)
     first, _ = bake(mesh, rays=16)
