@@ -15,11 +15,12 @@ from renderer.scene.camera import Camera
 @dataclass(frozen=True)
 class Confusion:
     """spread: the radius in pixels of the disc that a point infinitely far behind the focus makes;
-    focus_mm: the distance that is sharp.
+    focus_mm: the distance that is sharp; subject_mm: that of the camera's target.
     """
 
     spread: float
     focus_mm: float
+    subject_mm: float
 
 
 def confusion(camera: Camera, height: int) -> Confusion | None:
@@ -33,7 +34,8 @@ def confusion(camera: Camera, height: int) -> Confusion | None:
     focal = 0.5 * camera.sensor_mm / np.tan(np.radians(camera.fov_y_deg) / 2)
     focus = camera.distance_mm - camera.focus_mm
     diameter = focal**2 / (camera.f_number * max(focus - focal, 1.0))
-    return Confusion(float(0.5 * diameter / camera.sensor_mm * height), float(focus))
+    spread = 0.5 * diameter / camera.sensor_mm * height
+    return Confusion(float(spread), float(focus), float(camera.distance_mm))
 
 
 def through_lens(
@@ -67,6 +69,7 @@ def through_lens(
             factor=supersample,
             spread=lens.spread,
             focus_mm=lens.focus_mm,
+            subject_mm=lens.subject_mm,
             largest=largest,
         )
         gl.draw_fullscreen(context)
