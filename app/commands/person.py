@@ -55,7 +55,7 @@ def draw(seed, sex, age, tone, ancestry, apart, out) -> None:
     """Draw a person by SEED and write their file, to be rendered by --identity FILE or changed by
     hand. The same seed and bounds draw the same person.
     """
-    from stimuli.heads.identity import Bounds, written
+    from stimuli.person import Bounds, written
 
     if out.suffix != ".toml":
         raise click.BadParameter(f"{out}: expected a name that ends in .toml", param_hint="--out")
@@ -89,14 +89,12 @@ def sheet(names, out, scene, technique, columns, patches, size, supersample, see
     """
     from tqdm import tqdm
 
-    from stimuli.parts import PEOPLE
-    from stimuli.parts import names as known
-    from stimuli.portraits import portraits
-    from stimuli.portraits import sheet as laid
+    from stimuli.person import everybody, portraits
+    from stimuli.person import sheet as laid
 
     if out.suffix not in (".png", ".jpg"):
         raise click.BadParameter(f"{out}: expected .png or .jpg", param_hint="--out")
-    names = names or tuple(known(PEOPLE))
+    names = names or everybody()
     drawn = portraits(names, scene, patches, technique, size, supersample, seed)
     pictures = list(tqdm(drawn, total=len(names), desc="people", leave=False))
     laid(pictures, min(columns, len(pictures))).save(out, quality=93)

@@ -1,4 +1,6 @@
-"""A sheet of people: the same scene, camera and technique with one after the other."""
+"""People for the command line: drawn by a seed, and seen side by side, in the same scene, before the
+same camera, by the same technique.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +10,20 @@ from typing import Any
 
 from PIL import Image, ImageDraw, ImageFont
 
-from stimuli.parts import person_table
+from stimuli.heads.identity import Bounds, written
+from stimuli.parts import PEOPLE, person_table
+from stimuli.parts import names as known
 from stimuli.scenes import load_table, merge, read_scene, stage
 from stimuli.study import with_head
 
+__all__ = ["Bounds", "everybody", "portraits", "sheet", "written"]
 GAP, LINE = 6, 26
 PAPER, INK = (24, 24, 26), (225, 225, 225)
+
+
+def everybody() -> tuple[str, ...]:
+    """The names of the people that ship."""
+    return tuple(known(PEOPLE))
 
 
 def portraits(
