@@ -30,7 +30,11 @@ def studio(model, **patch):
 
 def small(name):
     """A technique as it is, but for the size of its atlas, the number of its points or walks."""
-    fewer = {"atlas": {"size": 256}, "points": {"spacing_mm": 8.0, "share": 0.9}, "walks": {"walks": 2}}
+    fewer = {
+        "atlas": {"size": 256},
+        "points": {"spacing_mm": 8.0, "share": 0.9},
+        "walks": {"walks": 2},
+    }
     return package.make(name, fewer.get(package.TECHNIQUES[name].domain, {}))
 
 
