@@ -214,8 +214,8 @@ def _band(points: np.ndarray, normals: np.ndarray, own: Clothes, cloth, cloth_no
     low = 0.4 - own.ease_mm
     # across the band and above the cloth: from below, over the edge, to the stitches and down
     profile = [(4.0, low), (0.3, low), (-0.5, 0.5 * low), (-0.6, 0.3 * thick), (0.0, thick)]
-    profile += [(wide * t, thick) for t in (0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97)]
-    profile += [(wide, 0.8 * thick), (wide + 0.3, -0.4)]
+    profile += [(wide * t, (1.4 + 0.2 * t) * thick) for t in (0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97)]
+    profile += [(wide, 1.4 * thick), (wide + 0.3, -0.4)]
     rib = RIB_DEPTH_MM * np.sin(2 * np.pi * at / RIB_MM)
     rows = []
     for across, above in profile:
@@ -227,7 +227,10 @@ def _band(points: np.ndarray, normals: np.ndarray, own: Clothes, cloth, cloth_no
         # near the ring its own surface, farther away the cloth's
         share = np.clip(across / 4, 0, 1)
         laid = spot - share * off[:, None] * normal
-        normal = (1 - share) * up + share * normal
+        # the nearest triangles change in steps along a row
+        laid = even(laid)
+        normal = even((1 - share) * up + share * normal)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         height = above + (rib if above > 0 and across > 0 else 0)
         rows.append(laid + (np.zeros(count) + height)[:, None] * normal)
     grid = np.array(rows)  # (R, K, 3)
