@@ -214,7 +214,8 @@ def _band(points: np.ndarray, normals: np.ndarray, own: Clothes, cloth, cloth_no
     low = 0.4 - own.ease_mm
     # across the band and above the cloth: from below, over the edge, to the stitches and down
     profile = [(4.0, low), (0.3, low), (-0.5, 0.5 * low), (-0.6, 0.3 * thick), (0.0, thick)]
-    profile += [(wide * t, (1.4 + 0.2 * t) * thick) for t in (0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97)]
+    shares = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 0.97)
+    profile += [(wide * t, (1.4 + 0.2 * t) * thick) for t in shares]
     profile += [(wide, 1.4 * thick), (wide + 0.3, -0.4)]
     rib = RIB_DEPTH_MM * np.sin(2 * np.pi * at / RIB_MM)
     rows = []
