@@ -53,7 +53,7 @@ void main() {
     n /= max(length(n), 1e-3);
     vec3 sum = around * open_to * (colour / PI);
     float facing = max(dot(n, v), 0.05);
-    sum += environment(reflect(-v, n), 6.0) * schlick(f0, facing) * open_to * 0.3;
+    sum += environment(reflect(-v, n), 6.0) * schlick(f0, facing) * open_to * 0.2;
     for (int k = 0; k < lamps; ++k) {
         vec2 lit = texelFetch(lit_map, ivec3(at, k), 0).rg;
         if (lit.y <= 0.0) continue;

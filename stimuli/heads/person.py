@@ -135,7 +135,7 @@ class Hair(Parameters):
     called: ClassVar[str] = "hair"
 
     colour: tuple[float, float, float] = parameter(
-        (0.055, 0.032, 0.019), source="dark brown, by eye", **_COLOUR
+        (0.036, 0.020, 0.012), source="dark brown, by eye", **_COLOUR
     )
     grey: float = parameter(0.0, unit="share", low=0.0, high=1.0, source="by eye")
     grey_colour: tuple[float, float, float] = parameter(
@@ -166,9 +166,7 @@ class Hair(Parameters):
     )
     brow_length_mm: float = parameter(43.0, unit="mm", low=10.0, high=80.0, source="by eye")
     brow_hair_mm: float = parameter(8.0, unit="mm, longest", low=1.0, high=25.0, source="by eye")
-    brow_light: float = parameter(
-        1.25, unit="of the colour", low=0.1, high=6.0, source="lighter than the scalp's, by eye"
-    )
+    brow_light: float = parameter(0.8, unit="of the colour", low=0.1, high=6.0, source="by eye")
     stubble: int = parameter(30000, unit="hairs", low=0, high=100000, source="second trial")
     stubble_mm: tuple[float, float] = parameter(
         (0.15, 0.55), unit="mm, shortest and longest", low=0.05, high=40.0, source="a day's beard"
