@@ -1,5 +1,5 @@
-"""People for the command line: drawn by a seed, and seen side by side, in the same scene, before the
-same camera, by the same technique.
+"""People for the command line: drawn by a seed, and seen side by side, in the same scene, before
+the same camera, by the same technique.
 """
 
 from __future__ import annotations
