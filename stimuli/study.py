@@ -457,6 +457,7 @@ def with_head(scene: dict, name: str, said: Mapping[str, Any] | None = None) -> 
         shape = {"shape": "scan", "file": name, **said}
     else:
         shape = {"shape": "person", "person": name}
+        shape |= {"dressed": own["dressed"]} if "dressed" in own else {}
     objects = {**scene.get("objects", {}), subject: {**place, **shape}}
     return {**scene, "objects": objects, **({"materials": materials} if materials else {})}
 

@@ -50,6 +50,13 @@ def test_bounds_narrow_who_is_drawn():
         Bounds(age_years=(50.0, 40.0))
 
 
+def test_another_head_stays_dressed():
+    portrait = scenes.load_table("portrait")
+    made = scenes.read_scene(with_head(portrait, "7")).objects["head"]
+    assert made.person == "7" and made.dressed
+    assert not scenes.read_scene(with_head(SCENE, "7")).objects["head"].dressed
+
+
 def test_a_drawn_person_is_a_file_too(tmp_path):
     """What `person draw` writes is read as what the seed draws."""
     assert tomllib.loads(written(5)) == draw(5)
