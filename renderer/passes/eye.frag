@@ -13,6 +13,7 @@ uniform vec3 iris_base; uniform vec3 iris_fibres; uniform vec3 iris_collarette; 
 uniform float pupil_mm; uniform float limbus_mm; uniform float limbus; uniform float veins; uniform float redness;
 uniform float lid_shade; uniform float lid_shade_mm; uniform float meniscus_mm;
 uniform vec3 noise_origin;
+const float SPREAD_MM = 0.9;           // of light in the sclera
 const float F0 = 0.0207;               // Fresnel at the tears' index of 1.336
 // Radians over which a lamp's edge is blurred in the tears: over the cornea, and over the uneven sclera and the corner's tissue.
 const vec2 SMOOTH = vec2(0.012, 0.09);
@@ -117,9 +118,15 @@ void main() {
     if (dot(r, n) < 0.0) r = normalize(r - n * (dot(r, n) - 0.02));
     float nv = max(dot(wet_n, v), 0.02), mirror = schlick(F0, nv);
     strand_disc_mm = 1.6;  // what passes between lashes is blurred
+    vec3 across = normalize(cross(n, vec3(0.0, 1.0, 0.01))), along = cross(n, across);
     for (int k = 0; k < lamps; ++k) {
         vec3 l = lamp_towards(k, world), light_here = lamp_light(k, world);
-        float seen = visibility(k, world, n, phase);
+        // light that enters the sclera comes out up to a millimetre away, so shadows of lids have soft edges there
+        float seen = 0.0;
+        for (int j = 0; j < 4; ++j) {
+            vec2 o = SPREAD_MM * size * vogel(j, 4, phase);
+            seen += 0.25 * visibility(k, world + across * o.x + along * o.y, n, phase + 1.3 * float(j));
+        }
         float on_iris = through_cornea(qn, l * frame);
         float on_white = smoothstep(-0.25, 1.0, dot(n, l));  // light wraps: the sclera scatters
         irradiance += light_here * seen * mix(on_iris, on_white, max(white, tissue));
