@@ -72,9 +72,9 @@ _SHAPES = ("oval", "round", "rectangular", "square", "triangular", "invertedtria
 # Iris between the fibres, fibres, collarette: linear albedo; and how often each is met without and
 # with ancestry of the kind that has light eyes.
 _IRISES = {
-    "dark brown": ([0.030, 0.016, 0.009], [0.055, 0.030, 0.016], [0.060, 0.032, 0.015], 0.75, 0.12),
-    "brown": ([0.075, 0.042, 0.020], [0.130, 0.075, 0.036], [0.160, 0.085, 0.035], 0.24, 0.28),
-    "hazel": ([0.095, 0.080, 0.042], [0.150, 0.120, 0.065], [0.200, 0.110, 0.045], 0.01, 0.18),
+    "dark brown": ([0.016, 0.009, 0.005], [0.030, 0.016, 0.009], [0.034, 0.018, 0.009], 0.75, 0.12),
+    "brown": ([0.034, 0.019, 0.010], [0.060, 0.034, 0.017], [0.075, 0.040, 0.018], 0.24, 0.28),
+    "hazel": ([0.055, 0.045, 0.024], [0.088, 0.070, 0.038], [0.115, 0.064, 0.027], 0.01, 0.18),
     "green": ([0.110, 0.130, 0.100], [0.190, 0.200, 0.150], [0.240, 0.150, 0.065], 0.0, 0.14),
     "grey": ([0.130, 0.155, 0.165], [0.220, 0.240, 0.245], [0.220, 0.190, 0.130], 0.0, 0.10),
     "blue": ([0.095, 0.145, 0.190], [0.190, 0.240, 0.280], [0.210, 0.190, 0.140], 0.0, 0.18),
@@ -312,13 +312,14 @@ def _skin(rng, sex: str, age: float, tone: float, light: float, hair) -> dict[st
         "flush": _rounded(rng.uniform(0.016, 0.032) * (1 + 0.3 * light), 4),
         "freckles": _rounded(rng.uniform(0.03, 0.09) if red else rng.uniform(0.0, 0.035)),
         "freckle_share": _rounded(0.6 if red else rng.uniform(0.1, 0.3), 2),
+        "lip_melanin": _rounded(0.45 + 0.3 * tone, 2),
         "moles": _rounded(rng.uniform(0.15, 0.35), 2),
         "mole_share": _rounded(rng.uniform(0.08, 0.28), 2),
         "mottling": _rounded(rng.uniform(0.7, 1.2) + 0.4 * np.clip((age - 45) / 30, 0, 1), 2),
         "wrinkles": _rounded(np.clip((age - 18) / 40, 0.15, 1.6), 2),
         "pores": _rounded(rng.uniform(0.65, 0.95) + 0.25 * (sex == "male"), 2),
-        "roughness_dry": _rounded(0.36 - 0.05 * oily, 3),
-        "roughness_oily": _rounded(0.23 - 0.04 * oily, 3),
+        "roughness_dry": _rounded(0.37 - 0.04 * oily, 3),
+        "roughness_oily": _rounded(0.25 - 0.04 * oily, 3),
     }
     if sex == "female":
         table["beard"] = 0.0
