@@ -74,7 +74,7 @@ def make(data: Path) -> dict[str, np.ndarray]:
             targets[f"macrodetails/{region}-{sex}-young"] = 1 / 6
         body = f"macrodetails/universal-{sex}-young-averagemuscle-averageweight"
         targets[body] = 0.5
-    made = anatomy.build_anatomy(data, Person(targets, Form.none()), 1)
+    made = anatomy.build_anatomy(data, Person(targets=targets, form=Form.none()), 1)
     bust, marks = made.coarse, dict(made.landmarks)
     marks |= {"eye_l": made.eyes[0].centre, "eye_r": made.eyes[1].centre}
     marks["crown"] = bust.positions[bust.positions[:, 1].argmax()]
