@@ -103,11 +103,12 @@ def seen(light: Light, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
     return -away, distance, strength
 
 
-#: Of lids and balls where they touch: below which openness a vertex counts as hidden, and the share
-#: of their light that others lend, which are open by a quarter more. Chosen by eye.
+#: Of lids and balls where they touch, and of skin below cloth: below which openness a vertex counts
+#: as hidden, and the share of their light that others lend, open by a quarter more. Chosen by eye.
 HIDDEN_BALL, HIDDEN_CORNER, HIDDEN_LID = 0.16, 0.34, 0.20
 LENT_BALL, LENT_LID = 0.9, 0.75
 LID_MM = 4.0  # from the ball, within which skin is a lid's
+HIDDEN_CLOTH, CLOTH_MM = 0.20, 15.0  # mm from the cloth's nearest point
 
 
 def _borrowed(baked: Baked, own: Body) -> Baked:
@@ -133,9 +134,9 @@ def _borrowed(baked: Baked, own: Body) -> Baked:
     return Baked(light, openness, sky)
 
 
-def body(item: Item, eyes: Sequence[Item] = ()) -> Body:
+def body(item: Item, eyes: Sequence[Item] = (), clothes: Sequence[Item] = ()) -> Body:
     """A surface, or an eye, in the world: as coarse as rays take it (its proxy). eyes: those whose
-    lids are the surface's.
+    lids are the surface's; clothes: what is worn over it.
     """
     part = item.primitive
     if hasattr(part, "proxy"):
@@ -145,7 +146,9 @@ def body(item: Item, eyes: Sequence[Item] = ()) -> Body:
         mapped = "albedo_map" in part.material.maps
         if isinstance(value, Skin) and proxy.masks is not None and not mapped:
             albedo = value.mean_albedo(proxy.masks)
-        hidden = _lids(positions, eyes) if eyes else None
+        hidden = None
+        if eyes or clothes:
+            hidden = np.maximum(_lids(positions, eyes), _below(positions, clothes))
         return Body(positions, normals, proxy.faces, np.asarray(albedo), proxy.smooth, hidden)
     positions, normals = item.in_world(part.positions), item.turned(part.normals)
     grey = np.full((len(positions), 3), 0.5)
@@ -161,6 +164,18 @@ def _lids(positions: np.ndarray, eyes: Sequence[Item]) -> np.ndarray:
         away = np.linalg.norm(positions - item.in_world(eye.centre), axis=1)
         near |= away < (eye.radius + LID_MM) * size
     return np.where(near, HIDDEN_LID, 0.0)
+
+
+def _below(positions: np.ndarray, clothes: Sequence[Item]) -> np.ndarray:
+    """`hidden` of a surface's vertices (N, 3): of those that lie beside cloth."""
+    from scipy.spatial import cKDTree
+
+    hidden = np.zeros(len(positions))
+    for item in clothes:
+        cloth = cKDTree(item.in_world(item.primitive.proxy.positions))
+        away, _ = cloth.query(positions, distance_upper_bound=CLOTH_MM)
+        hidden[np.isfinite(away)] = HIDDEN_CLOTH
+    return hidden
 
 
 class Tracer:

@@ -116,7 +116,16 @@ class Surfaces:
         eyes_of: dict[int, list[Item]] = {}
         for item in contents.eyes:
             eyes_of.setdefault(item.mesh, []).append(item)
-        bodies = [body(item, eyes_of.get(item.mesh, ())) for item in items]
+        clothes_of: dict[int, list[Item]] = {}
+        worn_over: dict[int, Item] = {}  # a head's skin is the first surface of its mesh
+        for item in contents.surfaces:
+            if worn_over.setdefault(item.mesh, item) is not item:
+                clothes_of.setdefault(item.mesh, []).append(item)
+        bodies = []
+        for item in items:
+            is_skin = worn_over.get(item.mesh) is item
+            clothes = clothes_of.get(item.mesh, ()) if is_skin else ()
+            bodies.append(body(item, eyes_of.get(item.mesh, ()), clothes))
         baked = _baked(bodies, lights, surroundings, rays, seed) if bodies else []
         self.media: list[str | dict] = []
         self._skin_tables: dict[spectral.Layers, gl.Texture] = {}

@@ -101,7 +101,8 @@ float surfaces_let_past(int lamp, vec3 p, vec3 n, float phase) {
     if (count == 0.0) return 1.0;
     float blocker = sum / count;
     float width = distant(lamp) ? (q.z - blocker) * size : size * (q.z - blocker) / max(blocker, 1.0);
-    float penumbra = max(width, 0.25) * scale, lit = 0.0;
+    float texel = 1.0 / float(textureSize(solid_depth, 0).x);
+    float penumbra = max(max(width, 0.25) * scale, 2.0 * texel), lit = 0.0;  // wider than the map's own steps
     for (int k = 0; k < 24; ++k) {
         vec2 o = penumbra * vogel(k, 24, phase + 1.7);
         lit += layer_depth(layer, q.xy + o) < q.z + dot(rise, o) / scale - 0.25 - 0.1 * length(o) / scale ? 0.0 : 1.0;
