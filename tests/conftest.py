@@ -5,6 +5,7 @@ import pytest
 from app import cli
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist looks for the groups
 def pytest_collection_modifyitems(items):
     """Which process of xdist runs what (--dist loadgroup): a file is one process's, and all files
     that look at the drawn head of tests/renderer are the same one's, which draws it once.

@@ -20,7 +20,7 @@ from stimuli.compare import chosen, framed
 from stimuli.errors import InputError
 from stimuli.experiment.chapter import front, write_csv
 from stimuli.experiment.figures import MARKERS, OKABE
-from stimuli.scenes import load_table, merge, read_scene
+from stimuli.scenes import camera, load_table, merge
 
 AXES = ("resolution", "covered", "samples", "triangles", "lights", "splats")
 ABOUT = {
@@ -102,8 +102,7 @@ def _steps(axis, scene, table, framing, techniques, options):
             size = max(16, round(width * share)), max(16, round(height * share))
             yield size[0] * size[1] * options.supersample**2, table, size, techniques
     elif axis == "covered":
-        named = {"camera": {"framing": framing}} if framing else {}
-        own = read_scene(merge(table, named)).camera.height_mm
+        own = camera(table, framing).height_mm
         for times in NEARER:
             level = {"camera": {"height_mm": own * times}}
             yield None, merge(table, level), options.size, techniques

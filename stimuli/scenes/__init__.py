@@ -17,7 +17,7 @@ from stimuli.errors import InputError
 from stimuli.parts import LIGHTS, SCENES, part, person_table, read_toml
 
 if TYPE_CHECKING:
-    from renderer.scene import Scene
+    from renderer.scene import Camera, Scene
     from renderer.scene.graph import SceneGraph
 
 MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -117,6 +117,15 @@ def framings(table: Mapping[str, Any]) -> list[str]:
 
     own = table.get("framings", {})
     return list(dict.fromkeys([*(own if isinstance(own, Mapping) else ()), *FRAMINGS]))
+
+
+def camera(table: Mapping[str, Any], framing: str = "") -> Camera:
+    """The camera of a scene's table, or that of another of its framings."""
+    from renderer.scene import Camera
+
+    if framing:
+        table = merge(table, {"camera": {"framing": framing}})
+    return Camera.read(_framed(dict(table), "scene").get("camera", {}), "scene.camera")
 
 
 def _framed(table: dict[str, Any], where: str) -> dict[str, Any]:

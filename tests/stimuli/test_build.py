@@ -183,7 +183,7 @@ def test_a_scene_is_put_up_once_for_all_its_cameras(write_toml, fake_renderer, o
     images = load_manifest(out).images
     assert images[0].levels == {"framing": "near", "skin": "pale"}
     assert images[0].file == "images/near.pale_plain.png"
-    assert {image.scene["picture"]["exposure"] for image in images} == {0.76, 1.2}
+    assert {image.scene["picture"]["exposure"] for image in images} == {1.45, 1.2}
     (out / images[-1].file).unlink()
     fake_renderer.scenes.clear()
     assert build(study, out) == built(1, 7)

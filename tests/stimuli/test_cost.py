@@ -67,7 +67,8 @@ def test_every_pass_and_an_axis_are_measured(tmp_path, capsys, monkeypatch):
 
 
 def test_the_steps_of_an_axis_grow_and_leave_the_scene_as_it_is():
-    table, options = {"camera": {"height_mm": 100.0}}, cost.Options((64, 48))
+    ball = {"framing": "ball", "height_mm": 100.0, "yaw_deg": 0.0}
+    table, options = {"camera": ball}, cost.Options((64, 48))
     steps = {
         axis: list(cost._steps(axis, "", table, "ball", {}, options))
         for axis in ("resolution", "covered", "samples")
