@@ -32,7 +32,8 @@ async function begin() {
   forget();
 
   const soon = setTimeout(() => showStatus(page, words.loading), FIRST_PAUSE_MS);
-  pictures.onTrouble = () => page.isConnected && showStatus(page, words.trouble);
+  // an answer that waits for the network is the graver news
+  pictures.onTrouble = () => page.isConnected && !recall() && showStatus(page, words.trouble);
   const shown = new Viewer(page, words);
   await shown.show();
   clearTimeout(soon);
