@@ -7,38 +7,22 @@ import pytest
 
 from renderer.scene.objects import Scan
 from stimuli.errors import InputError
-from stimuli.heads import anatomy, fetch, load_scan, mpfb, register, template
+from stimuli.heads import fetch, load_scan, mpfb, register, template
 from stimuli.heads.formats import Source
-from stimuli.heads.person import Person
 from stimuli.heads.placing import Asked, by_face, by_size
 from stimuli.heads.subdivide import triangles
-from stimuli.parts import PEOPLE, part, read_toml
+from tests.heads import awkward
+from tests.heads.awkward import person, turn
 
 pytestmark = pytest.mark.network
 
 ORDER = ("eye_l", "eye_r", "nose", "mouth", "chin")
 
 
-def turn(axis: str, degrees: float) -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
-
-
-def person(name: str):
-    return Person.read(read_toml(part(name, PEOPLE, "person")), name)
-
-
 @pytest.fixture(scope="module")
 def heads():
     """Name -> points (N, 3) mm, faces, true landmarks; no hair and no eyes."""
-    made = {}
-    for name in ("woman", "man_dark"):
-        built = anatomy.build_anatomy(fetch.mpfb_data(), person(name), 1)
-        bust, balls = built.coarse, built.eyes
-        marks = {**built.landmarks, "eye_l": balls[0].centre, "eye_r": balls[1].centre}
-        made[name] = bust.positions, bust.faces, marks
-    return made
+    return {name: awkward.head(name) for name in ("woman", "man_dark")}
 
 
 @pytest.fixture
@@ -46,67 +30,28 @@ def source(tmp_path):
     return Source(tmp_path / "scan.obj")
 
 
-def cut(points, faces, keep):
-    faces = faces[keep[faces].all(axis=1)]
-    used, faces = np.unique(faces, return_inverse=True)
-    return points[used], faces.reshape(-1, 3)
-
-
-def with_hair(points):
-    """A hairdo of a third of the head's size, above and behind."""
-    points = points.copy()
-    hair = (points[:, 1] > -75) | ((points[:, 2] < 20) & (points[:, 1] > -200))
-    points[hair] = [0, -100, 40] + (points[hair] - [0, -100, 40]) * 1.35
-    return points
-
-
-# name: (head, change of points and faces, rotation, units a mm, unit, up, turned)
-AWKWARD = {
-    "as it should be": ("woman", None, np.eye(3), 1e-3, "m", "y", 0),
-    "a bust in inches": ("woman", None, np.eye(3), 1 / 25.4, "in", "y", 0),
-    "from behind": ("man_dark", None, turn("y", 180), 1.0, "mm", "y", 180),
-    "turned by 46 degrees": ("man_dark", None, turn("y", 46), 0.1, "cm", "y", 46),
-    "z up": ("woman", None, turn("x", 90), 1.0, "mm", "z", 0),
-    "z up, looking along y": ("woman", None, turn("x", 90) @ turn("y", 180), 1.0, "mm", "z", 180),
-    "upside down": ("man_dark", None, turn("z", 180), 1.0, "mm", "-y", 0),
-    "lying, x up": ("woman", None, turn("z", -90), 0.1, "cm", "x", 0),
-    "a unit-normalised head": ("man_dark", "head", np.eye(3), 1 / 250, "scaled", "y", 0),
-    "a mask": ("woman", "mask", turn("y", -90), 1.0, "mm", "y", -90),
-    "a hairdo": ("man_dark", "hair", np.eye(3), 0.1, "cm", "y", 0),
-    "noise of 1.5 mm": ("woman", "noise", turn("y", -100), 1.0, "mm", "y", -100),
-}
-
-
-@pytest.mark.parametrize("name", AWKWARD)
-def test_an_awkward_head_is_put_upright_and_to_its_size(heads, source, name):
-    who, change, rotation, scale, unit, up, turned = AWKWARD[name]
-    points, faces, marks = heads[who]
-    if change == "head":
-        points, faces = cut(points, faces, points[:, 1] > -260)
-    elif change == "mask":
-        points, faces = cut(points, faces, (points[:, 2] > 60) & (points[:, 1] > -240))
-    elif change == "hair":
-        points = with_hair(points)
-    elif change == "noise":
-        points = points + np.random.default_rng(1).normal(size=points.shape) * 1.5
-    file = scale * points @ rotation.T
+@pytest.mark.parametrize("name", awkward.HEADS)
+def test_an_awkward_head_is_put_upright_and_to_its_size(source, name):
+    case = awkward.HEADS[name]
+    marks = awkward.head(case.who)[2]
+    file, faces = case.mesh()
     placed = by_face(source, file, faces, Asked(), name == "as it should be")
-    assert (placed.unit, placed.up) == (unit, up)
-    assert placed.turned_deg == pytest.approx(turned, abs=4)
+    assert (placed.unit, placed.up) == (case.unit, case.up)
+    assert placed.turned_deg == pytest.approx(case.turned_deg, abs=4)
     height = placed.fit.height * placed.mm_per_unit
     true = -marks["chin"][1]
-    if unit == "scaled":
+    if case.unit == "scaled":
         assert height == pytest.approx(template.load().height_mm)
         true = true * height / true
     else:
         assert height == pytest.approx(true, rel=0.04)
     # landmarks within a centimetre; upright, looking along +z
     found = placed.place(placed.fit.place(np.array([template.load().landmarks[n] for n in ORDER])))
-    shrunk = placed.mm_per_unit * scale
+    shrunk = placed.mm_per_unit * case.units_per_mm
     wanted = np.array([marks[n] for n in ORDER]) * shrunk
     assert np.linalg.norm(found - wanted, axis=1).mean() < 10
     assert found[0, 0] > 0 > found[1, 0] and found[2, 2] > found[:2, 2].max()
-    silent = placed.unit_source == "format" and turned == 0
+    silent = placed.unit_source == "format" and case.turned_deg == 0
     assert bool(source.notes) != silent
 
 
