@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from app.study import Study
 
 BUSY_TIMEOUT_S = 30
+#: Connections that a process keeps: one for each thread that answers (`app.server.Limits`).
+POOLED = 8
 
 
 class Database:
@@ -176,6 +178,7 @@ def connect(url: str) -> Engine:
     engine = create_engine(
         address,
         pool_pre_ping=address.get_backend_name() != "sqlite",
+        pool_size=POOLED,
         hide_parameters=True,  # what people answer stands in no log
     )
     if engine.dialect.name == "sqlite":

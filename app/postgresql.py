@@ -1,13 +1,19 @@
-"""PostgreSQL by pg8000, with what every answer asks for prepared once a connection.
+"""PostgreSQL by pg8000, with few round trips.
 
 pg8000 rewrites a statement character by character, has it parsed and planned and asks what it
-gives each time it runs, in three round trips; for a commit too. Statements with the option
-`prepared` are kept by the connection, and each then takes one round trip; BEGIN, COMMIT and
-ROLLBACK go as simple queries.
+gives each time it runs, in three round trips, and waits for every BEGIN, COMMIT and ROLLBACK. Each
+wait also hands the interpreter to other threads. So here:
+
+- statements with the option `prepared` are kept by the connection and then take one round trip;
+- BEGIN goes out with the first statement, and a reader's ROLLBACK is not waited for;
+- COMMIT goes out with a statement that has the option `commits`, which must be the last of its
+  transaction. If that statement fails, PostgreSQL makes a rollback of it;
+- whether a connection still stands is looked up in the socket: a server that ended has closed it.
 """
 
 from __future__ import annotations
 
+import selectors
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,17 +22,23 @@ from sqlalchemy import Engine, event
 
 def listen(engine: Engine) -> None:
     """Let an engine of the dialect postgresql+pg8000 connect and execute so."""
-    from pg8000.core import make_params
+    from pg8000 import core
     from pg8000.dbapi import Connection, DatabaseError, IntegrityError, convert_paramstyle
 
     class Kept(Connection):
-        """A connection that knows its prepared statements."""
+        """A connection that knows its prepared statements and the replies that it has not read."""
 
         def __init__(self, *args: Any, **kwargs: Any):
+            self._unread: list[str] = []  # simple queries that were sent
             super().__init__(*args, **kwargs)
             self._kept: dict[str, tuple] = {}
 
         def handle_messages(self, context: Any) -> None:
+            """Read a reply, after those of what was sent before."""
+            self._read_all()
+            self._handle(context)
+
+        def _handle(self, context: Any) -> None:
             try:
                 super().handle_messages(context)
             except DatabaseError as error:
@@ -36,33 +48,74 @@ def listen(engine: Engine) -> None:
                     raise IntegrityError(*error.args) from error
                 raise
 
+        def _send(self, query: str) -> None:
+            """A simple query, at the latest with what is asked next; its reply is read then."""
+            self.send_QUERY(query)
+            self._unread.append(query)
+
+        def _read_all(self) -> None:
+            while self._unread:
+                self._handle(core.Context(self._unread.pop(0)))
+
         def begin(self, how: str) -> None:
-            self.execute_simple(how)
+            self._send(how)
+            self._transaction_status = core.IN_TRANSACTION  # what cursors ask before they begin one
 
         def commit(self) -> None:
-            self.execute_simple("commit")
+            if self._unread != ["commit"]:  # not sent with the last statement
+                self._send("commit")
+                core._flush(self._sock)
+            self._read_all()
 
         def rollback(self) -> None:
             if self._in_transaction:
-                self.execute_simple("rollback")
+                self._send("rollback")
+                core._flush(self._sock)
+                self._transaction_status = core.IDLE
 
-        def run_prepared(self, statement: str, values: Sequence[Any]):
+        def stands(self) -> bool:
+            """Whether the other end has not closed the connection; raises where it says why."""
+            self._read_all()
+            with selectors.DefaultSelector() as sockets:
+                sockets.register(self._usock, selectors.EVENT_READ)
+                if sockets.select(0):  # closed, or a notice that nobody waits for
+                    self.execute_simple("select 1")
+            return True
+
+        def run_prepared(self, statement: str, values: Sequence[Any], commits: bool):
             """What the driver keeps of a statement that ran."""
             if statement not in self._kept:
                 text, _ = convert_paramstyle("format", statement, values)
                 self._kept[statement] = (*self.prepare_statement(text, ()), text)
             name, columns, reads, text = self._kept[statement]
-            return self.execute_named(
-                name, make_params(self.py_types, values), columns, reads, text
-            )
+            values = core.make_params(self.py_types, values)
+            if not commits:
+                return self.execute_named(name, values, columns, reads, text)
+            context = core.Context(columns=columns, input_funcs=reads, statement=text)
+            self.send_BIND(name, values)
+            self.send_EXECUTE()
+            self._sock.write(core.SYNC_MSG)
+            self.send_QUERY("commit")
+            core._flush(self._sock)
+            ending = "rollback"
+            try:
+                self.handle_messages(context)
+                ending = "commit"
+            finally:
+                self._unread.append(ending)
+            return context
 
     def connect(_dialect, _record, args, parameters):
         return Kept(*args, **parameters)
 
     def execute(cursor, statement, values, context) -> bool | None:
-        if context is None or not context.execution_options.get("prepared"):
+        connection = getattr(cursor, "cursor", cursor)._c  # one of the server's is wrapped
+        if connection._unread == ["commit"]:
+            raise RuntimeError("a statement after the one that commits its transaction")
+        options = {} if context is None else context.execution_options
+        if not options.get("prepared"):
             return None
-        done = cursor._c.run_prepared(statement, values)
+        done = connection.run_prepared(statement, values, options.get("commits", False))
         cursor._context = done
         cursor._row_iter = None if done.rows is None else iter(done.rows)
         return True
@@ -75,11 +128,7 @@ def listen(engine: Engine) -> None:
         isolation = "read committed" if writes else "repeatable read"
         connection.connection.driver_connection.begin(f"begin isolation level {isolation}")
 
-    def ping(connection) -> bool:
-        connection.execute_simple("select 1")  # by a cursor it would begin a transaction
-        return True
-
-    engine.dialect.do_ping = ping
+    engine.dialect.do_ping = Kept.stands
     event.listen(engine, "do_connect", connect)
     event.listen(engine, "begin", begin)
     event.listen(engine, "do_execute", execute)

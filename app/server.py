@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import logging
 import os
-import select
 import signal
 import socket
 import sys
@@ -23,6 +22,7 @@ from dataclasses import dataclass
 from waitress import create_server, wasyncore
 
 from app.errors import InputError
+from app.polling import Watched
 
 #: Files that a process opens beside its connections, at most.
 OTHER_FILES = 200
@@ -30,6 +30,9 @@ OTHER_FILES = 200
 LARGEST_HEADER, LARGEST_BODY = 64 * 1024, 256 * 1024
 #: A process that ends sooner than this is not started anew before it has passed.
 SHORTEST_LIFE_S = 1.0
+#: A thread that waited for the database goes on within that of its answer, whatever the other
+#: threads compute: by the interpreter's own 5 ms, each round trip could cost so much.
+SWITCH_S = 0.0005
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,7 @@ def run(
     """
     if workers == 1:
         signal.signal(signal.SIGTERM, _end)
-        _server(application, sockets, limits, **settings).run()
+        _serve(application, sockets, limits, **settings)
         return
     closes_with_us, _held = os.pipe()
 
@@ -98,7 +101,7 @@ def run(
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches us all; the parent decides
         signal.signal(signal.SIGTERM, _end)
         threading.Thread(target=_end_with, args=[closes_with_us], daemon=True).start()
-        _server(application, sockets, limits, **settings).run()
+        _serve(application, sockets, limits, **settings)
 
     signal.signal(signal.SIGTERM, _end)
     began: dict[int, float] = {}
@@ -116,11 +119,29 @@ def run(
         _stop(list(began), limits.grace_s)
 
 
-def _server(application: Callable, sockets: list[socket.socket], limits: Limits, **settings):
+def _serve(application: Callable, sockets: list[socket.socket], limits: Limits, **settings):
+    """Serve in this process until it is told to end."""
+    sys.setswitchinterval(SWITCH_S)
+    watched = Watched()
+    server = _server(application, sockets, limits, watched, **settings)
+    try:
+        watched.run()
+    except (SystemExit, KeyboardInterrupt):
+        server.task_dispatcher.shutdown()  # waits for the requests that are being answered
+
+
+def _server(
+    application: Callable,
+    sockets: list[socket.socket],
+    limits: Limits,
+    watched: Watched,
+    **settings,
+):
     # a line for each request that waits for a thread says nothing that a person could act on
     logging.getLogger("waitress.queue").setLevel(logging.ERROR)
     return create_server(
         application,
+        map=watched,
         sockets=sockets,
         threads=limits.threads,
         ident=None,
@@ -130,8 +151,6 @@ def _server(application: Callable, sockets: list[socket.socket], limits: Limits,
         cleanup_interval=min(30, max(1, limits.idle_s // 2)),  # how often it looks for them
         max_request_header_size=LARGEST_HEADER,
         max_request_body_size=LARGEST_BODY,
-        # select() knows 1,024 files at most
-        asyncore_use_poll=hasattr(select, "poll"),
         **settings,
     )
 
@@ -187,10 +206,10 @@ def _stop(processes: list[int], grace_s: float) -> None:
 @contextmanager
 def running(application: Callable) -> Iterator[str]:
     """Serve on a free port of this machine meanwhile, in a thread; gives the address."""
-    opened: dict = {}
+    opened = Watched()
     sockets = listen("127.0.0.1", 0)
-    server = _server(application, sockets, USUAL, map=opened)
-    thread = threading.Thread(target=server.run, daemon=True)
+    server = _server(application, sockets, USUAL, opened)
+    thread = threading.Thread(target=opened.run, daemon=True)
     thread.start()
     try:
         yield f"http://127.0.0.1:{port_of(sockets)}/"

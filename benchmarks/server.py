@@ -292,7 +292,13 @@ async def silent_thousand(server: Served) -> float:
 
 
 async def measure(options, study: Path, url: str, bare: Served, ours: Served) -> None:
-    at_once, each, people = options.at_once, options.answers, options.people
+    if options.turns:
+        await measure_flat_out(options, study, url, bare, ours)
+    await measure_crowd(options, bare, ours)
+
+
+async def measure_flat_out(options, study: Path, url: str, bare: Served, ours: Served) -> None:
+    at_once, each = options.at_once, options.answers
     connections = [await Connection(bare.port).open() for _ in range(at_once)]
     inserting = [lambda times, one=one: insert(one, times) for one in connections]
     taking = await crowd_of(ours.port, at_once)
@@ -324,6 +330,9 @@ async def measure(options, study: Path, url: str, bare: Served, ours: Served) ->
         rate, cpu = medians[name][0] / base[0], medians[name][1] / base[1]
         print(f"{name}: {rate:.2f} of the bare view's rate at {cpu:.2f} times its CPU")
 
+
+async def measure_crowd(options, bare: Served, ours: Served) -> None:
+    people = options.people
     print(f"\n{people} at once, thinking {THINKING_S:g} s, three connections each")
     print(f"{'':22}{'p50 ms':>10}{'p95 ms':>10}{'CPU ms':>10}{'sockets':>10}")
     connections = [await Connection(bare.port).open() for _ in range(people)]
@@ -345,7 +354,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--at-once", type=int, default=64)
     parser.add_argument("--answers", type=int, default=8, help="each, in a turn")
-    parser.add_argument("--turns", type=int, default=3)
+    parser.add_argument("--turns", type=int, default=3, help="0 for the crowd alone")
     parser.add_argument("--people", type=int, default=500)
     parser.add_argument("--crowd-answers", type=int, default=4)
     parser.add_argument("--bare", metavar="URL", help=argparse.SUPPRESS)

@@ -376,7 +376,7 @@ _DUE = (
     .where(Participant.visit == bindparam("visit"))
     .execution_options(prepared=True)
 )
-_APPEND = insert(Response.__table__).inline().execution_options(prepared=True)
+_APPEND = insert(Response.__table__).inline().execution_options(prepared=True, commits=True)
 _RECORDED = tuple(name for name in Answer.__dataclass_fields__ if name not in ("value", "rt_ms"))
 
 

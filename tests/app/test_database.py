@@ -8,7 +8,7 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import inspect, select, text
+from sqlalchemy import create_engine, inspect, select, text
 from sqlalchemy.exc import DatabaseError, IntegrityError
 
 import app as app_package
@@ -187,3 +187,52 @@ def test_what_every_answer_asks_for_is_prepared_and_readers_see_one_snapshot(app
         assert connection.execute(text("SHOW transaction_isolation")).scalar() == "repeatable read"
     with database.append() as connection:
         assert connection.execute(text("SHOW transaction_isolation")).scalar() == "read committed"
+
+
+@pytest.mark.skipif("POSTGRES_URL" not in os.environ, reason="about PostgreSQL")
+def test_an_answer_is_two_round_trips_and_a_page_three(app, person, monkeypatch):
+    from pg8000 import core
+
+    somebody, trips, flush = person().begin().answer(1), [], core._flush
+    monkeypatch.setattr(core, "_flush", lambda sock: (trips.append(1), flush(sock)))
+    form = somebody.form("trial") | {"answer": "1", "rt_ms": "321"}
+    reply = somebody.http.post("/question", data=form, headers={"Accept": "application/json"})
+    assert reply.json["outcome"] == "recorded" and len(trips) == 2
+    trips.clear()
+    somebody.get("/question")
+    assert len(trips) == 3  # the last of which nobody waits for
+
+
+@pytest.mark.skipif("POSTGRES_URL" not in os.environ, reason="about PostgreSQL")
+def test_a_statement_that_commits_is_the_last_and_undone_where_it_fails(app, person):
+    from app.questionnaire.flow import _APPEND
+
+    somebody = person().begin().answer(1)
+    database = app.extensions["database"]
+    with database.look() as connection:
+        row = dict(connection.execute(select(*Response.__table__.c)).mappings().one())
+    with pytest.raises(IntegrityError), database.append() as connection:
+        connection.execute(text("UPDATE responses SET rt_ms = 1"))
+        connection.execute(_APPEND, row | {"id": row["id"] + 1})  # the trial has an answer
+    assert somebody.rows[0].rt_ms == row["rt_ms"]
+    new = row | {"id": row["id"] + 1, "trial_id": int(somebody.form("trial")["trial"])}
+    with (
+        pytest.raises(RuntimeError, match="after the one that commits"),
+        database.append() as connection,
+    ):
+        connection.execute(_APPEND, new)
+        connection.execute(text("UPDATE responses SET rt_ms = 1"))
+    assert [one.rt_ms for one in somebody.rows] == [row["rt_ms"]] * 2  # what was committed is
+
+
+@pytest.mark.skipif("POSTGRES_URL" not in os.environ, reason="about PostgreSQL")
+def test_a_connection_that_the_database_closed_is_replaced_unseen(app, person):
+    somebody = person().begin().answer(1)
+    url = app.extensions["database"]._engine.url
+    other = create_engine(url)
+    with other.connect() as connection:
+        others = "pid <> pg_backend_pid() AND datname = current_database()"
+        closed = f"SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE {others}"
+        assert connection.scalar(text(closed)) >= 1
+    other.dispose()
+    assert len(somebody.answer(1).rows) == 2
