@@ -31,7 +31,7 @@ def assign(session: Session, study: Study, record: StudyRecord, participant: Par
     definition = study.definition
     design = definition.assignment
     if design.design == ADAPTIVE and not dealt_beside(study.seed, participant.id, design.beside):
-        from stimuli.adaptive import written
+        from analysis.adaptive import written
 
         state = asked_so_far(session, study, record, participant)
         participant.design_state = written(state)
@@ -74,10 +74,10 @@ def _next_list(session: Session, record: StudyRecord, participant: Participant) 
 def asked_so_far(
     session: Session, study: Study, record: StudyRecord, participant: Participant
 ) -> dict[str, list[list[int]]]:
-    """`stimuli.adaptive.State` of the others who count: what was answered, and what those who are
+    """`analysis.adaptive.State` of the others who count: what was answered, and what those who are
     at it will still be asked. Who tries the study out has a state apart.
     """
-    from stimuli.adaptive import nothing
+    from analysis.adaptive import nothing
 
     state = nothing(study.cells, study.techniques)
     place = {pair: k for k, pair in enumerate(combinations(study.techniques, 2))}

@@ -128,7 +128,7 @@ class Participant(Base):
     recruit_id: Mapped[str | None] = mapped_column(String(100), index=True, unique=True)
     # of stimuli.design; None: began before lists were dealt, drawn by the participant's number
     list_number: Mapped[int | None]
-    # JSON of stimuli.adaptive.State: what the pairs of an adaptive design were chosen from
+    # JSON of analysis.adaptive.State: what the pairs of an adaptive design were chosen from
     design_state: Mapped[str | None] = mapped_column(deferred=True)
     excluded_at: Mapped[datetime | None]
     excluded_because: Mapped[str | None] = mapped_column(String(500))

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from analysis.adaptive import AS_GOOD, LEAST_SHARE
 from stimuli.errors import InputError
 from stimuli.table import Table, refuse_doubles
 
@@ -30,7 +31,7 @@ def read_participants(table: Table) -> Participants:
 
 
 #: How pairs come to people: dealt evenly (`stimuli.design`), or those that tell most
-#: (`stimuli.adaptive`).
+#: (`analysis.adaptive`).
 DEALT, ADAPTIVE = "dealt", "adaptive"
 
 
@@ -49,8 +50,8 @@ class Assignment:
 
     pairs: int = 0
     design: str = DEALT
-    least_share: float = 0.5
-    as_good: float = 0.8
+    least_share: float = LEAST_SHARE
+    as_good: float = AS_GOOD
     beside: float = 0.0
 
     def record(self) -> dict:

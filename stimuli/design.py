@@ -18,7 +18,7 @@ from math import gcd
 
 import numpy as np
 
-from stimuli.adaptive import State, chosen
+from analysis.adaptive import State, chosen
 from stimuli.asking import Assignment, Quality, Trap
 
 #: What a stream of random words is for; the first is followed by the list's number.

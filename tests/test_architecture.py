@@ -11,9 +11,11 @@ ROOT = Path(__file__).resolve().parents[1]
 MAY_IMPORT = {
     "renderer": set(),
     "analysis": set(),
-    # what a manifest and a declared analysis are: one schema, standard library alone
+    # what a manifest and a declared analysis are: one schema, standard library alone; and which
+    # pairs an adaptive design asks: one rule
     "stimuli": {
         "renderer",
+        "analysis.adaptive",
         "analysis.declared",
         "analysis.errors",
         "analysis.files",
@@ -21,7 +23,6 @@ MAY_IMPORT = {
     },
     "app": {
         "analysis",
-        "stimuli.adaptive",
         "stimuli.design",
         "stimuli.errors",
         "stimuli.manifest",

@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
+from analysis.adaptive import AS_GOOD, LEAST_SHARE
 from analysis.errors import InputError
 from analysis.inference import alpha_of
 from analysis.options import Options
@@ -35,6 +36,7 @@ class Plan:
     answering   how people answer
     answers_each    pairs that the incomplete and the adaptive design ask each person at a framing
     options     the declared analysis: test, family, level, margin, resamples
+    least_share, as_good    of the adaptive design (`analysis.adaptive.chosen`), 0 to 1
     power       to be reached; most: people to think of; studies: simulated ones; seed
     """
 
@@ -51,6 +53,8 @@ class Plan:
     studies: int = 1000
     seed: int = 1
     differences: Mapping[str, float] = field(default_factory=dict)
+    least_share: float = LEAST_SHARE
+    as_good: float = AS_GOOD
 
     def __post_init__(self) -> None:
         pairs = len(self.techniques) * (len(self.techniques) - 1) // 2
@@ -87,6 +91,8 @@ class Plan:
                 self.alpha < self.power < 1,
                 "a probability above alpha and below 1",
             ),
+            ("least_share", self.least_share, 0 <= self.least_share <= 1, "a number from 0 to 1"),
+            ("as_good", self.as_good, 0 <= self.as_good <= 1, "a number from 0 to 1"),
             ("most", self.most, 5 <= self.most <= 5000, "people from 5 to 5000"),
             (
                 "studies",

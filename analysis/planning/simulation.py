@@ -1,10 +1,8 @@
 """Simulated studies of a plan, decided by the functions that decide a table in `analyse`.
 
 The designs: `full` asks every pair of everyone; `incomplete` asks each person so many pairs drawn
-at random; `adaptive` asks as many, those from which most is expected to be learnt: log(1 + v I), v
-the variance of the pair's difference given all answers so far and I the Fisher information of the
-answer at its present estimate (a greedy D-optimal choice, as in Mikhailiuk et al. 2021,
-arXiv:2004.05691).
+at random; `adaptive` asks as many, those from which most is expected to be learnt, by the rule of
+the questionnaire (`analysis.adaptive`).
 """
 
 from __future__ import annotations
@@ -16,6 +14,7 @@ import numpy as np
 from scipy import stats
 
 from analysis import bootstrap
+from analysis.adaptive import most_telling
 from analysis.inference.contrasts import linear_contrasts
 from analysis.inference.people import (
     decided,
@@ -27,9 +26,6 @@ from analysis.inference.people import (
 )
 from analysis.planning.plan import Plan
 
-#: Prior standard deviation, in JOD, of the worths in the adaptive design: wide, so that the first
-#: people meet all pairs.
-PRIOR_JOD = 2.0
 #: Answers that are drawn at once, so that memory stays flat.
 CHUNK = 4_000_000
 ANSWERS = np.arange(-2, 3)
@@ -167,34 +163,20 @@ def answers(plan: Plan, worths: np.ndarray, studies: int, rng: np.random.Generat
 
 def chosen(plan: Plan, answers: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """(studies, people, pairs) bool: the pairs that the adaptive design asks each person, given
-    what those before answered.
+    what those before answered. People come one after the other.
     """
-    model, (studies, people, pairs), n = plan.answering, answers.shape, len(plan.techniques)
-    a, b = np.array(plan.pairs).T
-    ends = np.zeros((pairs, n))
-    ends[np.arange(pairs), a], ends[np.arange(pairs), b] = -1, 1
-    grid = np.linspace(-8, 8, 641)
-    shares = model.shares(grid)
-    slopes = np.gradient(shares, grid, axis=0)
-    information = (slopes**2 / np.maximum(shares, 1e-12)).sum(
-        axis=1
-    )  # of one answer about d, 1/JOD^2
-    expected = model.mean(grid)
-    precision = np.broadcast_to(np.eye(n) / PRIOR_JOD**2, (studies, n, n)).copy()
-    pull, outer = np.zeros((studies, n)), np.einsum("ki,kj->kij", ends, ends)
-    asked = np.zeros(answers.shape, bool)
-    slope = np.interp(0, grid, np.gradient(expected, grid))
+    studies, people, pairs = answers.shape
+    rows, asked = np.zeros((studies, pairs, 5), int), np.zeros(answers.shape, bool)
+    worths = None
     for person in range(people):
-        variance = np.linalg.inv(precision)
-        d = np.einsum("sij,sj->si", variance, pull) @ ends.T
-        weight = np.interp(d, grid, information)
-        gain = np.log1p(np.einsum("ki,sij,kj->sk", ends, variance, ends, optimize=True) * weight)
-        gain += 1e-6 * rng.random(gain.shape)  # draws lots among equals
-        places = np.argpartition(-gain, plan.each - 1, axis=1)[:, : plan.each]
-        np.put_along_axis(asked[:, person], places, True, axis=1)
-        used = weight * asked[:, person]
-        # the answer as a measurement of d: one step of Fisher scoring from the present estimate
-        seen = d + (answers[:, person] - np.interp(d, grid, expected)) / slope
-        precision += np.einsum("sk,kij->sij", used, outer)
-        pull += (used * seen) @ ends
+        lots = rng.random((studies, pairs))
+        places, worths = most_telling(
+            rows, len(plan.techniques), plan.each, plan.least_share, plan.as_good, lots, worths
+        )
+        mine = asked[:, person]
+        np.put_along_axis(mine, places, True, axis=1)
+        given = answers[:, person]
+        rows[..., 0] += mine  # sides make no difference here
+        for column, preferred in ((2, given < 0), (3, given > 0), (4, given == 0)):
+            rows[..., column] += mine & preferred
     return asked

@@ -232,6 +232,8 @@ def command(
         answering=answering,
         framings=cells,
         answers_each=answers or definition.assignment.pairs // len(cells),
+        least_share=definition.assignment.least_share,
+        as_good=definition.assignment.as_good,
         options=options,
         power=wanted,
         most=most,

@@ -14,8 +14,8 @@ from itertools import combinations
 import numpy as np
 from scipy import stats
 
+from analysis.adaptive import nothing
 from analysis.worth import JOD_SIGMA, thurstone_jod
-from stimuli.adaptive import nothing
 from stimuli.asking import ADAPTIVE, Assignment
 from stimuli.design import adaptive_trials, trials
 

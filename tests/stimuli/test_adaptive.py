@@ -7,7 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from stimuli.adaptive import PRIOR, information, nothing, posterior, written
+from analysis.adaptive import PRIOR, chosen, information, most_telling, nothing, posterior, written
+from analysis.planning import Plan
+from analysis.planning.simulation import chosen as planned
 from stimuli.asking import ADAPTIVE, Assignment, Quality, Trap
 from stimuli.design import adaptive_trials
 
@@ -121,3 +123,41 @@ def test_techniques_that_are_alike_are_asked_evenly():
         counts = np.array([state[cell] for cell in CELLS])[..., :2].sum(axis=2)
         spans[as_good] = np.ptp(counts, axis=1).max()
     assert spans[0.8] <= 2 < spans[1.0]
+
+
+def test_many_studies_at_once_are_each_as_alone():
+    rng = np.random.default_rng(6)
+    rows = rng.integers(0, 9, (20, 10, 5))
+    rows[:5, 3] = 0  # one that fell behind
+    lots = rng.random((20, 10))
+    places, means = most_telling(rows, 5, 6, 0.5, 0.8, lots)
+    for some, lot, place, mean in zip(rows, lots, places, means):
+        alone, own = most_telling(some, 5, 6, 0.5, 0.8, lot)
+        assert alone.tolist() == place.tolist() and own == pytest.approx(mean, abs=1e-9)
+        assert len(set(alone.tolist())) == 6
+    assert (places[:5] == 3).any(axis=1).all()
+
+
+@pytest.mark.parametrize(("least_share", "as_good"), [(0.5, 0.8), (0.9, 0.8), (0.0, 1.0)])
+def test_power_simulates_the_rule_of_the_questionnaire(least_share, as_good):
+    """Person after person the same pairs, from the same answers and the same lots."""
+    plan = Plan(
+        ITEMS,
+        ("a", "b"),
+        answers_each=4,
+        most=25,
+        studies=50,
+        least_share=least_share,
+        as_good=as_good,
+    )
+    answers = np.random.default_rng(3).integers(-2, 3, (1, plan.most, len(PLACE))).astype(np.int8)
+    asked = planned(plan, answers, np.random.default_rng(4))[0]
+    rng, state = np.random.default_rng(4), nothing(("near",), ITEMS)
+    for mine, given in zip(asked, answers[0]):
+        share = iter([0.0, *rng.random(len(PLACE)), *[0.5] * 100]).__next__
+        pairs = chosen(state, ("near",), ITEMS, 4, least_share, as_good, share)
+        places = [PLACE[min((a, b), (b, a))] for _, a, b in pairs]
+        assert sorted(places) == np.flatnonzero(mine).tolist()
+        for k in places:
+            state["near"][k][0] += 1
+            state["near"][k][2 if given[k] < 0 else 3 if given[k] > 0 else 4] += 1

@@ -15,6 +15,9 @@ that was asked least, so that the noise of few answers does not steer: among nea
 the greatest information alone costs a quarter of all answers (`benchmarks/pairs.py`).
 
 No package is used: theirs is published as notebooks and MATLAB, without releases.
+
+The questionnaire chooses by this when somebody begins (`stimuli.design.adaptive_trials`), and
+`subdermal power` in the studies that it simulates.
 """
 
 from __future__ import annotations
@@ -29,6 +32,10 @@ import numpy as np
 #: large that 98 % prefer one.
 PRIOR = 1.5
 NODES, WEIGHTS = np.polynomial.hermite.hermgauss(24)
+#: What a study that says nothing else takes (`stimuli.asking.Assignment`).
+LEAST_SHARE, AS_GOOD = 0.5, 0.8
+#: Newton's steps end where none is longer, logits.
+CLOSE = 1e-10
 
 #: Of each pair of a cell, in the order of `combinations`: how often it was asked with its first
 #: and with its second technique on the left, how often the first, the second and neither was
@@ -47,33 +54,87 @@ def written(state: State) -> str:
     return json.dumps(state, separators=(",", ":"), sort_keys=True)
 
 
-def posterior(rows: Sequence[Sequence[int]], items: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (n,) and covariance (n, n) of the worths of a cell, logits; 'no difference' is half a
-    win for each.
+def posterior(
+    rows: Sequence | np.ndarray, items: int, start: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (..., n) and covariance (..., n, n) of the worths of a cell, logits, from its counts
+    (..., K, 5); 'no difference' is half a win for each. start: (..., n), worths near the mean.
     """
     ends = _ends(items)
     counts = np.asarray(rows, float)
-    won, lost = counts[:, 2] + counts[:, 4] / 2, counts[:, 3] + counts[:, 4] / 2
-    worth = np.zeros(items)
-    precision = np.eye(items) / PRIOR**2
+    won, lost = counts[..., 2] + counts[..., 4] / 2, counts[..., 3] + counts[..., 4] / 2
+    worth = np.zeros((*counts.shape[:-2], items)) if start is None else start
+    outer, prior = ends[:, :, None] * ends[:, None, :], np.eye(items) / PRIOR**2
     for _ in range(100):
-        p = _logistic(ends @ worth)
-        gradient = ends.T @ (won * (1 - p) - lost * p) - worth / PRIOR**2
-        precision = ends.T @ ((won + lost) * p * (1 - p) * ends.T).T + np.eye(items) / PRIOR**2
-        step = np.linalg.solve(precision, gradient)
-        worth = worth + step / max(1.0, np.abs(step).max())
-        if np.abs(step).max() < 1e-10:
+        p = _logistic(worth @ ends.T)
+        gradient = (won * (1 - p) - lost * p) @ ends - worth / PRIOR**2
+        precision = np.tensordot((won + lost) * p * (1 - p), outer, 1) + prior
+        step = np.linalg.solve(precision, gradient[..., None])[..., 0]
+        longest = np.abs(step).max(axis=-1, keepdims=True)
+        worth = worth + step / np.maximum(1.0, longest)
+        if longest.max() < CLOSE:
             break
     return worth, np.linalg.inv(precision)
 
 
 def information(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
-    """(K,), nats: what an answer about each of K pairs is expected to tell, of the mean and the
-    variance of their differences, logits.
+    """(...), nats: what an answer about each pair is expected to tell, of the mean and the variance
+    of its difference, logits.
     """
-    d = mean[:, None] + np.sqrt(2 * variance)[:, None] * NODES
-    p, weights = _logistic(d), WEIGHTS / np.sqrt(np.pi)
-    return _entropy(p @ weights) - _entropy(p) @ weights
+    weights = WEIGHTS / np.sqrt(np.pi)
+    d = mean[..., None] + np.sqrt(2 * variance)[..., None] * NODES
+    size = np.abs(d)
+    entropy = np.exp(-size)  # in place from here on: there are studies by the thousand
+    less = entropy / (1 + entropy)  # the probability of the less probable answer
+    np.log1p(entropy, out=entropy)
+    size *= less
+    entropy += size
+    np.subtract(0.5, less, out=less)
+    p = np.copysign(less, d, out=d)
+    p += 0.5
+    return _entropy(p @ weights) - entropy @ weights
+
+
+def most_telling(
+    rows: Sequence | np.ndarray,
+    items: int,
+    some: int,
+    least_share: float,
+    as_good: float,
+    lots: np.ndarray,
+    start: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(..., some): the pairs of a cell for the next person, by their places among `combinations`,
+    from its counts (..., K, 5); and the means (..., n) of the worths, logits.
+
+    lots: (..., K), which of equal ones. The rest as in `chosen` and `posterior`.
+    """
+    count = np.asarray(rows)[..., :2].sum(axis=-1)
+    least = np.floor(least_share * (count.sum(axis=-1) + some) / count.shape[-1])
+    order = np.lexsort((lots, count), axis=-1)
+    mean, covariance = posterior(rows, items, start)
+    ends = _ends(items)
+    d, places = mean @ ends.T, np.empty((*count.shape[:-1], some), int)
+    taken = np.zeros(count.shape, bool)
+    for turn in range(some):
+        k = order[..., turn]  # of those that fell behind, the next
+        behind = _at(count, k) < least
+        if not behind.all():
+            spread = np.einsum("...ij,ki,kj->...k", covariance, ends, ends, optimize=True)
+            gain = np.where(taken, -np.inf, information(d, np.maximum(spread, 0)))
+            worse = gain < as_good * gain.max(axis=-1, keepdims=True)
+            best = np.lexsort((lots, -np.round(gain, 9), count, worse), axis=-1)[..., 0]
+            k = np.where(behind, k, best)
+        places[..., turn] = k
+        np.put_along_axis(taken, k[..., None], True, axis=-1)
+        p = _logistic(_at(d, k))
+        along = np.einsum("...ij,...j->...i", covariance, ends[k])
+        weight = p * (1 - p)
+        weight = weight / (1 + weight * np.einsum("...i,...i->...", ends[k], along))
+        covariance = (
+            covariance - weight[..., None, None] * along[..., :, None] * along[..., None, :]
+        )
+    return places, mean
 
 
 def chosen(
@@ -98,41 +159,10 @@ def chosen(
     result = []
     for place, cell in enumerate(by_need):
         some = pairs // len(cells) + (place < pairs % len(cells))
-        places = _of_cell(state[cell], len(techniques), some, least_share, as_good, share)
+        lots = np.array([share() for _ in known])
+        places, _ = most_telling(state[cell], len(techniques), some, least_share, as_good, lots)
         result += _sided(cell, state[cell], [(k, *known[k]) for k in places], techniques, share)
     return result
-
-
-def _of_cell(
-    rows: Sequence[Sequence[int]],
-    items: int,
-    some: int,
-    least_share: float,
-    as_good: float,
-    share: Callable[[], float],
-) -> list[int]:
-    """The pairs of one cell, by their places among `combinations`."""
-    count = np.asarray(rows)[:, :2].sum(axis=1)
-    lots = np.array([share() for _ in count])
-    least = np.floor(least_share * (count.sum() + some) / len(count))
-    behind = [k for k in np.lexsort((lots, count)) if count[k] < least][:some]
-    mean, covariance = posterior(rows, items)
-    ends, places = _ends(items), []
-    for _ in range(some):
-        if len(places) < len(behind):
-            k = int(behind[len(places)])
-        else:
-            spread = np.einsum("ki,ij,kj->k", ends, covariance, ends)
-            gain = information(ends @ mean, np.maximum(spread, 0))
-            gain[places] = -np.inf
-            worse = gain < as_good * gain.max()
-            k = int(np.lexsort((lots, -np.round(gain, 9), count, worse))[0])
-        places.append(k)
-        p = _logistic(ends[k] @ mean)
-        along = covariance @ ends[k]
-        weight = p * (1 - p)
-        covariance = covariance - np.outer(along, along) * weight / (1 + weight * ends[k] @ along)
-    return places
 
 
 def _sided(
@@ -163,6 +193,11 @@ def _ends(items: int) -> np.ndarray:
     ends = np.zeros((len(first), items))
     ends[np.arange(len(first)), first], ends[np.arange(len(first)), second] = 1, -1
     return ends
+
+
+def _at(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(...): of values (..., K) those at places (...)."""
+    return np.take_along_axis(values, places[..., None], axis=-1)[..., 0]
 
 
 def _logistic(d: np.ndarray) -> np.ndarray:
