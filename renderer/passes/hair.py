@@ -97,15 +97,22 @@ class Hair:
             **lamps.uniforms(),
             **surroundings.uniforms(),
             "places": self.fixed()["places"],
+            "tangents": self.fixed()["tangents"],
             "normals": lift,
         }
         program = programs("passes/hair_lit.frag", {**lamps.defines(), **surroundings.defines()})
         count = max(1, len(lamps.lights))
         self._lit = gl.TextureArray(COLUMNS, self.rows, count, GL.GL_RG16F)
-        with gl.Target(COLUMNS, self.rows, [GL.GL_RG16F]) as target:
+        smooth = programs("passes/hair_smooth.frag")
+        size, formats = (COLUMNS, self.rows), [GL.GL_RG16F]
+        with gl.Target(*size, formats) as raw, gl.Target(*size, formats) as target:
+            along = {"raw": raw.textures[0], "tangents": self.fixed()["tangents"]}
             for k in range(len(lamps.lights)):
-                target.bind()
+                raw.bind()
                 program.use(**program.accepts({**values, "lamp": k}))
+                gl.draw_fullscreen(context)
+                target.bind()
+                smooth.use(**along)
                 gl.draw_fullscreen(context)
                 self._lit.copy_layer(k)
         lift.delete()

@@ -46,14 +46,14 @@ void main() {
     vec3 v = normalize(camera_position - p);
     float root = (index - 1.0) / (index + 1.0), f0 = root * root;
     vec3 forward = sqrt(max(colour, 1e-4));  // one way through, what a fibre passes on
-    // light from everywhere: past the layer above, once into the fibre's colour, and mirrored
+    // light from everywhere: past the layer above, back from the fibre or through it and back from another, and mirrored
     float open_to = exp(-extinction * cover.w);
     vec3 n = cover.xyz - t.xyz * dot(cover.xyz, t.xyz);
     n += 0.35 * (v - t.xyz * dot(v, t.xyz));
     n /= max(length(n), 1e-3);
-    vec3 sum = around * open_to * (colour / PI);
+    vec3 sum = around * open_to * (colour + 0.12 * forward) / PI;
     float facing = max(dot(n, v), 0.05);
-    sum += environment(reflect(-v, n), 6.0) * schlick(f0, facing) * open_to * 0.2;
+    sum += environment(reflect(-v, n), 6.0) * schlick(f0, facing) * open_to * 0.1;
     for (int k = 0; k < lamps; ++k) {
         vec2 lit = texelFetch(lit_map, ivec3(at, k), 0).rg;
         if (lit.y <= 0.0) continue;

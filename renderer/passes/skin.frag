@@ -255,7 +255,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, bool mapped, vec3 ma
     h = mix(h, vermilion, lips);
     thickness = mix(thickness, lip_epidermis, lips);
     // hair below the surface: scalp and shaven beard, dots that merge with distance
-    hair *= layer_hair;
+    hair = layer_hair * smoothstep(0.15, 1.0, hair);  // before the line hairs are too few to tint the skin
     beard *= layer_hair;
     float rooted = clamp(hair + 0.75 * beard, 0.0, 1.0) * (0.75 + 0.25 * noise(q / 4.0)), dots = 0.10;
     if (rooted > 0.02) {
@@ -399,6 +399,7 @@ void main() {
     lobes = clamp(sqrt(m * m * lobe_roughness * lobe_roughness + bend), 0.03, 0.9);
     strength = specular_strength;
     if (has_specular_map == 1) strength *= map_at(specular_map, uv).r;
+    if (procedural == 1) strength *= 1.0 - scalp_tint * layer_hair * smoothstep(0.2, 0.9, a.z);  // roots stand where a scalp would shine
 #if DOMAIN == SCREEN
     if (dot(n, v) < 0.02) n = normalize(n + v * (0.02 - dot(n, v)));
     if (dot(mirror, v) < 0.02) mirror = normalize(mirror + v * (0.02 - dot(mirror, v)));

@@ -319,8 +319,9 @@ class Skin(Material):
         """Linear albedo (N, 3) at the scale of bounced light, from masks (N, 8)."""
         column = {name: masks[:, k : k + 1] for k, name in enumerate(MASKS)}
         albedo = skin.shown(self.layers, *self.pigments(masks))
-        rooted = 0.75 * np.clip(column["hair"] + 0.75 * self.beard * column["beard"], 0, 1)
-        albedo = albedo * (1 + self.scalp * column["hair"] * (np.array(SCALP) - 1))
+        hair = _smoothstep(0.15, 1.0, column["hair"])
+        rooted = 0.75 * np.clip(hair + 0.75 * self.beard * column["beard"], 0, 1)
+        albedo = albedo * (1 + self.scalp * hair * (np.array(SCALP) - 1))
         albedo = albedo * (1 - rooted * np.array(ROOTED) - 0.45 * DOTS_MEAN * rooted)
         return albedo + column["inside"] * (np.array(INSIDE) - albedo)
 

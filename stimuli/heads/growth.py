@@ -191,9 +191,11 @@ def grow(
 
 
 def gather(curves, roots, leader: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Curves (S, P, 3) drawn to that of their leader (S,), an index, by `share` (P,) of the way."""
-    led = curves[leader] + (roots - roots[leader])[:, None] * (1 - share)[None, :, None]
-    return curves + share[None, :, None] * (led - curves)
+    """Curves (S, P, 3) drawn to that of their leader (S,), an index, by `share` (S, P) of the
+    way.
+    """
+    led = curves[leader] + (roots - roots[leader])[:, None] * (1 - share)[..., None]
+    return curves + share[..., None] * (led - curves)
 
 
 def nearest_of(places: np.ndarray, side: np.ndarray, count: int, rng) -> np.ndarray:

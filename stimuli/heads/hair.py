@@ -8,17 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from scipy.spatial import cKDTree
 
 from renderer.scene import MASKS, Strands
 from renderer.scene.shapes import points_on, triangle_areas
 from stimuli.heads import growth, lashes
 from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.person import Hair, Lashes
-from stimuli.heads.skin import smoothstep
+from stimuli.heads.skin import azimuth, smoothstep
 from stimuli.heads.styles import Style
 
 POINTS = 7
 TIP = 0.35  # of the width at the root, where a hair was never cut
+LONG_MM = 60.0  # longer hair meets the body
+PART_BESIDE_MM = 8.0  # how far a parting is felt, falling by e
+FACE_DEG, FACE_UP_MM = 62.0, (-110.0, 35.0)  # azimuths and heights over the eyes of the face
+ALONE_MM, ALONE = 5.0, 30  # with fewer points of other strands so near a strand hangs alone
 
 
 @dataclass(frozen=True)
@@ -80,15 +85,19 @@ def straight(
     rng: np.random.Generator,
     frizz: float = 0.0,
     points: int = POINTS,
+    towards: np.ndarray | None = None,
 ) -> np.ndarray:
     """Short strands (S, points, 3): start `lift` radians above the skin along `flow` (S, 3), and
-    lie down by `bend` radians.
+    lie down by `bend` radians; `towards` (S, 3): where along the skin their tips point, else as
+    they start.
     """
     s = np.linspace(0, 1, points)
     angle = lift[:, None] - bend[:, None] * s[None]
-    step = (
-        np.cos(angle)[..., None] * flow[:, None] + np.sin(angle)[..., None] * roots.normals[:, None]
-    )
+    along = flow[:, None]
+    if towards is not None:
+        along = (1 - s)[:, None] * along + s[:, None] * towards[:, None]
+        along = along / np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-6)
+    step = np.cos(angle)[..., None] * along + np.sin(angle)[..., None] * roots.normals[:, None]
     if frizz:
         step += (
             frizz * np.cumsum(rng.normal(size=(len(length), points, 3)), axis=1) / np.sqrt(points)
@@ -147,6 +156,10 @@ def scalp_hair(
     sides = np.where(around[:, 0] < style.part_mm, -1.0, 1.0)
     says = growth.combed(style, around, eyes, sides)
     density = smoothstep(0.10, 0.95, rough) * (mask > 0.02) * says.density
+    # beside a parting few strands lie over the scalp: there roots are denser
+    away = np.abs(around[:, 0] - style.part_mm)
+    beside = growth.parting_nearness(style, around, eyes) * np.exp(-away / PART_BESIDE_MM)
+    density *= 1 + style.part_dense * beside
     roots = scatter_roots(scalp, density, int(own.scalp * share), rng)
     skin, longest = _around(scalp, mask, own), own.scalp_length
     groups = [_styled(roots, skin, scalp, eyes, rng, share, own)]
@@ -213,7 +226,7 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
         return a * one[lock] + b * two[own_tuft] + c * rng.normal(size=(count, *shape))
 
     fly = rng.random(count) < style.flyaways
-    turn = np.tan(np.radians(style.stray_deg)) * draw(0.75, 0.5, 0.35, 3)
+    turn = np.tan(np.radians(style.stray_deg)) * draw(0.45, 0.45, 0.40, 3)
     turn[fly] *= 2.5
     edge = style.edge + (1 - style.edge) * smoothstep(0.05, 0.8, whole)
     spread = np.clip(0.5 + 0.28 * draw(0.35, 0.5, 0.8), 0, 1)
@@ -223,7 +236,10 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
     height = says.height * np.clip(0.15 + 0.85 * deep + 0.16 * draw(0.8, 0.6, 0.0), 0.05, 1.3)
     height = np.where(fly, says.height * rng.uniform(0.9, 1.9, count) + 1.0, height)
     height *= 0.35 + 0.65 * smoothstep(0.1, 0.9, whole)
-    lift = np.radians(np.clip(style.lift_deg + 9 * draw(0.5, 0.5, 0.7), 3, 88))
+    beside = growth.parting_nearness(style, p, eyes)
+    beside = beside * np.exp(-np.abs(p[:, 0] - style.part_mm) / PART_BESIDE_MM)
+    lift = style.lift_deg + style.part_lift_deg * beside + 9 * draw(0.5, 0.5, 0.7)
+    lift = np.radians(np.clip(lift, 3, 88))
     points = style.points
     curves = growth.grow(style, skin, eyes, p, n, sides, length, height, turn, lift, points)
     # tufts gather in locks, strands in tufts
@@ -231,35 +247,59 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
     led, of_lock = curves[tufts], np.searchsorted(tufts, tufts[lock])
     first_of = np.zeros(len(tufts), int)
     first_of[own_tuft] = of_lock
-    led = growth.gather(led, p[tufts], first_of, style.gather_locks * s**1.2)
     apiece = smoothstep(3.0, 34.0, length) if not style.coil else np.ones(count)
+    drawn = style.gather_locks * apiece[tufts][:, None] * s**1.2
+    led = growth.gather(led, p[tufts], first_of, drawn)
     share_of = style.gather_tufts * apiece[:, None, None] * (s**0.8)[None, :, None]
     loose = np.where(fly, 0.25, 1.0)[:, None, None]
     apart = (p - p[tufts][own_tuft])[:, None] * (1 - 0.7 * s)[None, :, None]
     curves += loose * share_of * (led[own_tuft] + apart - curves)
     curves = _waved(curves, style, length, draw, rng, skin)
-    flat = curves.reshape(-1, 3)
-    keep_off = np.tile(growth.CLEAR_MM * np.minimum(8 * s, 1.0), count)
-    at, deep = skin.at(flat), np.arange(len(flat))
-    for _ in range(4):  # out of the head, along slopes that turn on the way
-        deep = deep[at[deep, 0] < keep_off[deep] - 0.02]
-        flat[deep] += (keep_off[deep] - at[deep, 0])[:, None] * at[deep, 1:]
-        at[deep] = skin.at(flat[deep])
-    curves = flat.reshape(curves.shape)
+    curves, at = _out_of_the_head(curves, skin, 4)
+    if length.max() > LONG_MM:  # what met the body has corners
+        for _ in range(3):
+            curves[:, 2:-1] += 0.25 * (curves[:, 1:-2] - 2 * curves[:, 2:-1] + curves[:, 3:])
+        curves, at = _out_of_the_head(curves, skin, 2)
     curves[:, 0] = p
     width = own.width_mm * np.clip(1 + 0.13 * rng.normal(size=count), 0.6, 1.4)
     width *= 0.6 + 0.4 * smoothstep(0.05, 0.6, whole)
     tone = own.lightness * draw(0.35, 0.45, 0.8)
-    return {
-        **_pack(
-            curves,
-            width,
-            pigmented(own, tone, rng.random(count) < own.grey),
-            growth.covered(curves, width / share, at[:, 1:]),
-            roots.vertex,
-        ),
-        "tip": np.full(count, 0.8 if length.mean() < 15 else 0.5),
-    }
+    colours = pigmented(own, tone, rng.random(count) < own.grey)
+    cover = growth.covered(curves, width / share, at[:, 1:])
+    tip = np.full(count, 0.8 if length.mean() < 15 else 0.5)
+    kept = ~alone_before_the_face(curves, eyes, share)
+    whole_lot = {**_pack(curves, width, colours, cover, roots.vertex), "tip": tip}
+    return {name: values[kept] for name, values in whole_lot.items()}
+
+
+def _out_of_the_head(curves: np.ndarray, skin: growth.Grid, times: int):
+    """Curves (S, P, 3) pushed along the skin's slopes, which turn on the way, and what the grid
+    says of their points (S P, 4).
+    """
+    s = np.linspace(0, 1, curves.shape[1])
+    flat = curves.reshape(-1, 3)
+    keep_off = np.tile(growth.CLEAR_MM * np.minimum(8 * s, 1.0), len(curves))
+    at, deep = skin.at(flat), np.arange(len(flat))
+    for _ in range(times):
+        deep = deep[at[deep, 0] < keep_off[deep] - 0.02]
+        flat[deep] += (keep_off[deep] - at[deep, 0])[:, None] * at[deep, 1:]
+        at[deep] = skin.at(flat[deep])
+    return flat.reshape(curves.shape), at
+
+
+def alone_before_the_face(curves: np.ndarray, eyes: np.ndarray, share: float) -> np.ndarray:
+    """Which strands (S, P, 3) pass before the face with few others beside them (S,): a bundle may
+    hang there, a single hair reads as a wire.
+    """
+    flat = curves.reshape(-1, 3)
+    up = flat[:, 1] - eyes[1]
+    before = (azimuth(flat) < FACE_DEG) & (up < FACE_UP_MM[1]) & (up > FACE_UP_MM[0])
+    alone = np.zeros(len(flat), bool)
+    if before.any():
+        there = flat[before]
+        beside = cKDTree(there).query_ball_point(there, ALONE_MM, return_length=True)
+        alone[before] = beside < max(2.0, ALONE * share)
+    return alone.reshape(curves.shape[:2]).any(axis=1)
 
 
 def _waved(curves, style: Style, length, draw, rng, skin) -> np.ndarray:
@@ -312,54 +352,68 @@ class Projector:
 
 
 def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: Hair) -> list[dict]:
-    """Each brow follows an arc over its eye, in two layers: short fine hairs that lie on the skin,
-    and longer ones that rise at the nose and turn outwards; those from above lean down, those from
-    below lean up, so that they meet in a ridge.
+    """Each brow follows an arc over its eye: tapered hairs that stand up at the nose, turn outwards
+    along the body, lean down from the upper edge and up from the lower, so that they meet in a
+    ridge, and grow fewer towards the tail; between them fine, short, pale ones. Both differ.
     """
     project, out = Projector(scalp), []
     for centre in eye_centres:
         side = np.sign(centre[0])
-        under = rng.random(count) < 0.45
-        u = rng.beta(1.25, 1.20, count)
-        ragged = 0.035 * rng.normal(size=count)
-        u = np.clip(u + ragged * (u < 0.2), 0, 1.02)
-        x = own.brow_inner_mm + own.brow_length_mm * u
-        arc = (
-            own.brow_low_mm
-            + own.brow_arch_mm * np.sin(np.pi * np.clip(0.04 + 0.86 * u, 0, 1))
-            - 4.0 * smoothstep(0.70, 1.0, u)
+        uneven = own.brow_uneven * rng.normal(size=5)
+        low, arch = own.brow_low_mm + 0.5 * uneven[0], own.brow_arch_mm * (1 + 0.10 * uneven[1])
+        long, peak = own.brow_length_mm * (1 + 0.03 * uneven[2]), 0.64 + 0.04 * uneven[3]
+        turn = 0.07 * uneven[4]
+        phase = rng.uniform(0, 2 * np.pi, 3)
+
+        def arc(u, low=low, arch=arch, peak=peak):
+            """Height of the brow's middle, mm: up to the peak, and down from it."""
+            rise = 1.1 * smoothstep(-0.30, peak, u) - 0.10
+            return low + arch * rise - (0.5 * arch + 4.0) * smoothstep(peak - 0.08, 1.15, u)
+
+        fine = rng.random(count + int(own.brow_fine * count)) >= 1 / (1 + own.brow_fine)
+        many = len(fine)
+        u = rng.uniform(-0.03, 1.06, 8 * many)
+        there = smoothstep(-0.04, 0.16, u) * (1 - 0.86 * smoothstep(0.66, 1.06, u))
+        u = u[rng.random(len(u)) < there][:many]
+        half = own.brow_half_mm * (1 - 0.62 * smoothstep(0.42, 1.05, u))
+        half = half * (0.70 + 0.30 * smoothstep(-0.05, 0.30, u))
+        half = half * (1 + 0.09 * np.sin(9 * u + phase[0]) + 0.07 * np.sin(23 * u + phase[1]))
+        v = rng.normal(size=many) * np.where(fine, 0.60, 0.46)
+        v = np.clip(np.where(rng.random(many) < 0.05, 1.9 * v, v), -1.6, 1.6)
+        x = own.brow_inner_mm + long * u
+        roots = project.roots(
+            np.column_stack([centre[0] + side * x, centre[1] + arc(u) + half * v])
         )
-        half = own.brow_half_mm * (1 - 0.70 * smoothstep(0.40, 1.0, u))
-        half = half * (0.62 + 0.38 * smoothstep(-0.05, 0.25, u))
-        wander = np.sin(9.0 * u + 2.0 * side) + 0.7 * np.sin(23.0 * u + side)
-        half = half * (1 + 0.10 * wander)
-        v = rng.normal(size=count) * np.where(rng.random(count) < 0.06, 0.95, 0.50)
-        v = np.clip(v, -1.7, 1.7)
-        roots = project.roots(np.column_stack([centre[0] + side * x, centre[1] + arc + half * v]))
-        head = 1 - smoothstep(0.02, 0.30, u)
-        tilt = np.radians(66 * head + 20 - 44 * smoothstep(0.50, 0.95, u))
-        tilt = tilt - (0.50 * (1 - 0.7 * head)) * v + 0.17 * rng.normal(size=count)
-        tilt = tilt + 0.12 * np.sin(31.0 * u + 4.0 * v)
-        flow = _tangential(
-            np.column_stack([side * np.cos(tilt), np.sin(tilt), np.zeros(count)]), roots.normals
+        along = np.arctan2(arc(u + 0.02) - arc(u - 0.02), 0.04 * long)
+        head, tail = 1 - smoothstep(0.0, 0.34, u), smoothstep(0.55, 1.0, u)
+        tilt = along + turn + np.radians(14 + 58 * head - 12 * tail)
+        tilt = tilt - np.radians(30) * (1 - 0.6 * head) * (1 - 0.4 * tail) * v
+        tilt = tilt + 0.10 * np.sin(31 * u + 4 * v + phase[2]) + 0.16 * rng.normal(size=many)
+        ends = tilt - np.radians(rng.uniform(4, 34, many)) * (0.5 + head) * np.sign(v + 0.6)
+
+        def on_skin(angle, roots=roots, side=side):
+            flat = np.column_stack([side * np.cos(angle), np.sin(angle), 0 * angle])
+            return _tangential(flat, roots.normals)
+
+        length = own.brow_hair_mm * np.clip(0.80 + 0.16 * rng.normal(size=many), 0.4, 1.2)
+        length = length * (0.62 + 0.38 * smoothstep(-0.02, 0.30, u)) * (1 - 0.40 * tail)
+        length = length * np.where(fine, rng.uniform(0.30, 0.62, many), 1.0)
+        length = length * (1 - 0.30 * np.clip(np.abs(v) - 0.7, 0, 1))
+        lift = np.radians(np.where(fine, rng.uniform(4, 14, many), rng.uniform(9, 24, many)))
+        points = straight(
+            roots, on_skin(tilt), length, lift, 1.3 * lift, rng, frizz=0.05, towards=on_skin(ends)
         )
-        length = rng.uniform(0.62, 1.12, count) * own.brow_hair_mm
-        length = length * (0.70 + 0.30 * smoothstep(0.0, 0.25, u))
-        length = length * (1 - 0.38 * smoothstep(0.65, 1.0, u)) * np.where(under, 0.62, 1.0)
-        length = length * (1 - 0.25 * np.clip(np.abs(v) - 0.9, 0, 1))
-        lift = np.radians(np.where(under, rng.uniform(3, 10, count), rng.uniform(9, 26, count)))
-        points = straight(roots, flow, length, lift, 1.25 * lift, rng, frizz=0.07)
-        thin = np.where(under, 0.72, 1.0) * (1 - 0.35 * np.clip(np.abs(v) - 0.7, 0, 1))
-        tone = np.log(own.brow_light) + 1.1 * own.lightness * rng.normal(size=count)
-        deep = np.where(under, 0.55, 0.2)[:, None] * np.ones(POINTS)
+        width = own.brow_width_mm * np.clip(1 + 0.18 * rng.normal(size=many), 0.6, 1.5)
+        width = width * (1 - 0.35 * np.clip(np.abs(v) - 0.6, 0, 1)) * (1 - 0.25 * tail)
+        tone = np.log(own.brow_light) + own.lightness * rng.normal(size=many) + 0.5 * fine
         packed = _pack(
             points,
-            rng.uniform(0.050, 0.080, count) * thin,
-            pigmented(own, tone, rng.random(count) < 0.6 * own.grey),
-            deep,
+            width * np.where(fine, 0.42, 1.0),
+            pigmented(own, tone, rng.random(many) < 0.6 * own.grey),
+            np.where(fine, 0.6, 0.3)[:, None] * np.ones(POINTS),
             roots.vertex,
         )
-        out.append({**packed, "tip": np.full(count, 0.15)})
+        out.append({**packed, "tip": np.full(many, 0.12)})
     return out
 
 

@@ -278,7 +278,7 @@ def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dic
         "colour": [_rounded(v, 4) for v in colour],
         "grey": _rounded(grey, 2),
         "style": _style(rng, sex, age, ancestry[0]),
-        "brows": int(rng.uniform(900, 1500) * (1.0 if sex == "male" else 0.75)),
+        "brows": int(rng.uniform(420, 660) * (1.0 if sex == "male" else 0.8)),
         "brow_half_mm": _rounded(rng.normal(4.3 if sex == "male" else 3.2, 0.4), 2),
         "stubble": int(rng.uniform(8000, 40000)) if sex == "male" else 0,
     }

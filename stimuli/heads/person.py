@@ -155,7 +155,18 @@ class Hair(Parameters):
     hairline_mm: float = parameter(
         0.0, unit="mm lower on the forehead", low=-40.0, high=30.0, source="by eye"
     )
-    brows: int = parameter(1250, unit="hairs a brow", low=0, high=5000, source="second trial")
+    brows: int = parameter(
+        540, unit="hairs a brow", low=0, high=5000, source="250 to 500 of adults, by eye"
+    )
+    brow_fine: float = parameter(
+        0.9, unit="fine hairs below each", low=0.0, high=5.0, source="by eye"
+    )
+    brow_width_mm: float = parameter(
+        0.078, unit="mm, at the root", low=0.01, high=0.2, source="adults 0.05 to 0.1"
+    )
+    brow_uneven: float = parameter(
+        1.0, unit="of 0.5 mm and a tenth of the arch", low=0.0, high=4.0, source="by eye"
+    )
     brow_low_mm: float = parameter(
         11.0, unit="mm above the eye's centre", low=0.0, high=40.0, source="second trial"
     )
@@ -166,7 +177,7 @@ class Hair(Parameters):
     )
     brow_length_mm: float = parameter(43.0, unit="mm", low=10.0, high=80.0, source="by eye")
     brow_hair_mm: float = parameter(8.0, unit="mm, longest", low=1.0, high=25.0, source="by eye")
-    brow_light: float = parameter(0.8, unit="of the colour", low=0.1, high=6.0, source="by eye")
+    brow_light: float = parameter(0.45, unit="of the colour", low=0.1, high=6.0, source="by eye")
     stubble: int = parameter(30000, unit="hairs", low=0, high=100000, source="second trial")
     stubble_mm: tuple[float, float] = parameter(
         (0.15, 0.55), unit="mm, shortest and longest", low=0.05, high=40.0, source="a day's beard"

@@ -82,6 +82,26 @@ def azimuth(p: np.ndarray) -> np.ndarray:
     return np.degrees(np.arctan2(np.abs(p[:, 0]), p[:, 2] - HEAD_AXIS_Z))
 
 
+HEAD_MM = 80.0  # radius that azimuths are unrolled with
+
+
+def _within_line(around, up, regions: Regions, hairline_mm: float) -> np.ndarray:
+    """How far within the hairline a place is, mm (N,), negative outside: across the line, which is
+    steep at temple and sideburn. around (N,) degrees; up (N,) mm above the eyes.
+    """
+    from scipy.spatial import cKDTree
+
+    def height(degrees):
+        line = np.interp(degrees, *np.transpose(regions.hairline))
+        return line - hairline_mm * smoothstep(*regions.hairline_deg, degrees)
+
+    fine = np.linspace(0, 180, 721)
+    unrolled = np.radians(HEAD_MM)
+    line = cKDTree(np.column_stack([unrolled * fine, height(fine)]))
+    away = line.query(np.column_stack([unrolled * around, up]))[0]
+    return np.sign(up - height(around)) * away
+
+
 def masks(
     anatomy: Anatomy, bust: Bust, hairline_mm: float = 0.0, regions: Regions | None = None
 ) -> np.ndarray:
@@ -98,9 +118,8 @@ def masks(
     wander = _wobble(p, regions.line_noise_scale_mm)
     noise_line, noise_top, noise_bottom = regions.line_noise_mm
     off_ear = 1 - smoothstep(0.15, 0.6, own["ears"])
-    line = np.interp(around, *np.transpose(regions.hairline))
-    line = line - hairline_mm * smoothstep(*regions.hairline_deg, around)
-    hair = smoothstep(*regions.hairline_soft_mm, up - line + noise_line * wander) * off_ear
+    within = _within_line(around, up, regions, hairline_mm)
+    hair = smoothstep(*regions.hairline_soft_mm, within + noise_line * wander) * off_ear
     top = np.interp(around, *np.transpose(regions.beard_top))
     bottom = np.interp(around, *np.transpose(regions.beard_bottom))
     beard = (

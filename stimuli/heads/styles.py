@@ -47,6 +47,12 @@ class Style(Parameters):
     part_mm: float = parameter(0.0, unit="mm to the left", low=-60, high=60, source="by eye")
     part_reach_mm: float = _mm(0.0, 200.0, "length of the parting from the hairline; 0: none")
     part_gap_mm: float = _mm(0.8, 6.0, "skin that shows in the parting")
+    part_dense: float = parameter(
+        1.2, unit="more roots beside the parting", low=0.0, high=5.0, source="by eye"
+    )
+    part_lift_deg: float = parameter(
+        24.0, unit="degrees more beside the parting", low=0.0, high=70.0, source="by eye"
+    )
     tie_up_mm: float = parameter(0.0, unit="mm above the eyes", low=-100, high=120, source="by eye")
     tie_forward_mm: float = parameter(-75.0, unit="mm", low=-140, high=140, source="by eye")
     tie_mm: float = _mm(0.0, 60.0, "radius of the bound hair; 0: it is not tied")
