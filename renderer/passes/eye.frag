@@ -66,9 +66,8 @@ void main() {
 
     // how far the lids' edges are, and their shade
     vec2 edge = has_edges == 1 ? to_edges(edges, edges_mm, front.xy) : vec2(20.0);
-    float under = lid_shade * exp(-max(edge.x, 0.0) / lid_shade_mm), over = 0.5 * lid_shade * exp(-max(edge.y, 0.0) / (0.4 * lid_shade_mm));
-    float corner = 0.20 * lid_shade * (1.0 - tissue) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 2.5);
-    vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner)), vec3(0.90, 1.06, 1.08));  // lids send back red light
+    float over = 0.5 * lid_shade * exp(-max(edge.y, 0.0) / (0.4 * lid_shade_mm));
+    float corner = 0.45 * lid_shade * (1.0 - tissue) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 3.0);
 
     // iris, seen through the cornea
     vec3 q = to_iris(p, n * frame, -v * frame);
@@ -85,16 +84,24 @@ void main() {
     vec3 solid = front + noise_origin;
     float outward = smoothstep(iris_radius * 1.1, iris_radius * 1.95, rim);
     vec3 sclera = sclera_colour * (1.0 + 0.05 * fbm(solid / 2.2));
-    float flush = redness * (0.10 + 0.42 * outward + 0.20 * exp(-max(min(edge.x, edge.y), 0.0) / 0.8)) * (0.8 + 0.5 * fbm(solid / 3.1 + 5.0));
+    float flush = redness * (0.10 + 0.42 * outward + 0.20 * exp(-max(min(edge.x, edge.y), 0.0) / 0.8) + 0.45 * exp(-max(edge.x + edge.y - 1.5, 0.0) / 1.8)) * (0.8 + 0.5 * fbm(solid / 3.1 + 5.0));
     sclera *= exp(-max(flush, 0.0) * vec3(0.10, 0.52, 0.50));
     sclera *= exp(-veins * vessel * vec3(0.55, 1.9, 1.75) * (0.55 + 0.45 * outward));
     // the limbus: the sclera overlaps the cornea softly, and a grey-blue ring lies under it
     float ragged = 0.16 * noise(vec3(normalize(p.xy + 1e-4) * 5.0, seed)) + 0.06 * noise(vec3(normalize(p.xy + 1e-4) * 17.0, seed));
-    float white = smoothstep(iris_radius - 0.62 * limbus_mm, iris_radius + 0.38 * limbus_mm, rim + ragged);
+    float white = smoothstep(iris_radius - 0.75 * limbus_mm, iris_radius + 0.45 * limbus_mm, rim + ragged);
     white = max(white, step(p.z, 0.0));
     vec3 albedo = mix(iris, sclera, white);
-    float ring = exp(-pow((rim - iris_radius + 0.12 * limbus_mm) / (0.62 * limbus_mm), 2.0)) * step(0.0, p.z);
-    albedo *= 1.0 - limbus * ring * vec3(1.0, 0.98, 0.90);
+    // it is broader above and below, where the sclera reaches farther over the cornea, and not equally dark all round
+    float wide = 0.55 + 0.20 * abs(p.y) / max(rim, 1e-3), dark = 0.85 + 0.35 * noise(vec3(normalize(p.xy + 1e-4) * 1.7, seed + 3.0));
+    float from = rim - iris_radius + 0.10 * limbus_mm;
+    float ring = exp(-pow(from / ((from < 0.0 ? wide : 1.35 * wide) * limbus_mm), 2.0)) * step(0.0, p.z);
+    albedo *= 1.0 - min(limbus * dark, 0.95) * ring * vec3(1.0, 0.98, 0.92);
+    // light that ends on the iris came in higher on the cornea, nearer to the lid and its lashes; the ball's sides turn away from it
+    float behind = 1.0 - max(white, tissue);
+    float under = min(lid_shade * (1.0 + 0.30 * behind), 1.0) * exp(-max(edge.x - 0.9 * behind, 0.0) / lid_shade_mm);
+    float sides = 0.35 * lid_shade * (1.0 - tissue) * smoothstep(0.55, 1.25, angle);
+    vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner) * (1.0 - sides)), vec3(0.90, 1.06, 1.12));  // lids send back red light
     // the corner: the fold is pink, the caruncle redder and dull
     vec3 flesh = mix(vec3(0.58, 0.33, 0.30), vec3(0.60, 0.31, 0.26), caruncle) * (1.0 + 0.16 * fbm(solid / 0.55) - 0.10 * fbm(solid / 0.25));
     albedo = mix(albedo, flesh, tissue);
@@ -103,7 +110,7 @@ void main() {
     vec3 wet_n = n;
     if (has_edges == 1 && meniscus_mm > 0.0) {
         for (int k = 0; k < 2; ++k) {
-            float d = k == 0 ? edge.x : edge.y, tall = k == 0 ? 0.6 * meniscus_mm : meniscus_mm * (1.0 + 0.25 * noise(solid / 1.7));
+            float d = k == 0 ? edge.x : edge.y, tall = k == 0 ? 0.6 * meniscus_mm : meniscus_mm * max(1.0 + 0.5 * noise(solid / 1.3) + 0.4 * noise(solid / 0.5), 0.1);
             float t = 1.0 - clamp(d / tall, 0.0, 1.0);
             vec2 away = away_from_edge(edges, edges_mm, front.xy, k);
             wet_n = normalize(wet_n + mat3(model) * vec3(away, 0.15) / size * (1.9 * t * t));

@@ -10,21 +10,23 @@ vec2 away_from_edge(sampler2D edges, vec2 edges_mm, vec2 own, int which) {
     return d / max(length(d), 1e-4);
 }
 
-// Skin of lids. Distance in mm from the edge that lies on the ball, seen from the front; 99 where no lid is near. local: mm of the object.
+// Skin of lids. x: distance in mm from the edge that lies on the ball, seen from the front; 99 where no lid is near. y: how much of it is the
+// upper lid's, half at the corners. local: mm of the object.
 uniform int lid_count; uniform vec4 lid_ball[2];  // centre, radius
 uniform sampler2D edges_a; uniform sampler2D edges_b;
 uniform vec2 edges_mm;
-float from_edge(vec3 local) {
+vec2 on_lid(vec3 local) {
     for (int k = 0; k < lid_count; ++k) {
         vec3 own = local - lid_ball[k].xyz;
         float away = length(own) - lid_ball[k].w;
         if (away > 4.5 || own.z < 0.0) continue;
         vec2 edge = k == 0 ? to_edges(edges_a, edges_mm, own.xy) : to_edges(edges_b, edges_mm, own.xy);
-        return -min(edge.x, edge.y);
+        float far = 6.0 * smoothstep(3.0, 4.5, away);  // no border where lids end
+        return vec2(far - min(edge.x, edge.y), clamp(0.5 + 0.4 * (edge.y - edge.x), 0.0, 1.0));
     }
-    return 99.0;
+    return vec2(99.0, 0.0);
 }
 
 // The share of light that comes through skin from behind: a lid holds a plate of dense tissue, the tarsus, 8 to 10 mm high in the upper one.
 uniform float tarsus;
-float through_lid(vec3 local) { return 1.0 - tarsus * (1.0 - smoothstep(3.0, 6.0, from_edge(local))); }
+float through_lid(vec3 local) { return 1.0 - tarsus * (1.0 - smoothstep(3.0, 6.0, on_lid(local).x)); }

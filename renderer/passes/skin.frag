@@ -5,6 +5,7 @@
 #include "shaders/diffuse.glsl"
 #include "passes/surface_out.glsl"
 #include "passes/lids.glsl"
+#include "passes/lid_margin.glsl"
 #if DOMAIN != SCREEN
 #include "passes/transmission.glsl"
 #endif
@@ -33,7 +34,6 @@ uniform vec4 forehead_lines; uniform vec2 forehead_lines_half; uniform float for
 uniform vec2 crows_feet_place; uniform vec4 crows_feet; uniform vec2 crows_feet_angle;
 uniform vec4 lid_lines; uniform vec2 lid_lines_half; uniform float lid_lines_period;
 uniform vec2 wrinkles_behind;  // the eyes: on the forehead, around the eyes
-uniform vec3 lid_margin; uniform float lash_line;
 uniform float material_id;           // 1, 2, ...: which medium scatters below; 0: none
 uniform float even_light;           // 1, or 0: what the environment and other surfaces send is left out
 uniform vec3 noise_origin;           // mm: the seed's place in the solid noise
@@ -381,13 +381,7 @@ void main() {
             normal_f0 = mix(f0, f0_oily, max(oil, 0.0));
         }
     }
-    // a lid's margin: pink and wet from the ball to its outer rim, darker along the lashes' roots
-    float from = from_edge(local), margin = 1.0 - smoothstep(0.25, 0.70, from);
-    if (from < 4.0) {
-        albedo *= 1.0 - lash_line * vec3(0.85, 1.0, 1.0) * exp(-pow((from - 1.05) / 0.42, 2.0));
-        albedo = mix(albedo, lid_margin, 0.60 * margin);
-        m = mix(m, 0.16, margin);
-    }
+    to_margin(local, local + noise_origin, albedo, m);
     if (has_roughness_map == 1) m = clamp(map_at(roughness_map, uv).r, 0.12, 0.9);
     // What is too fine for a pixel widens the lobes: slopes of a mean square s add s to m^2. The smooth surface's own turn within a pixel
     // does so too (Tokuyoshi and Kaplanyan 2019).

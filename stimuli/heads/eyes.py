@@ -18,6 +18,7 @@ from stimuli.heads.vessels import vessel_map
 
 RINGS, SEGMENTS = 96, 96
 ACROSS, UP = 44, 30  # vertices of the sheet in the corner
+PLICA_MM, PALE = (0.1, 1.6), 0.25  # above the ball, where it pales; how much flesh is left there
 COLOURS = ("iris", "fibres", "collarette", "sclera")
 
 
@@ -47,14 +48,14 @@ def eyeball(
     faces = _grid(RINGS, SEGMENTS, True)
     tissue = np.zeros((len(positions), 2))
     if opening is not None and own.caruncle:
-        more, lumpy = corner(ball, opening, own)
+        more, own_tissue = corner(ball, opening, own)
         sheet = _grid(ACROSS, UP, False)
         if ball.centre[0] < 0:
             sheet = sheet[:, ::-1]
         faces = np.vstack([faces, sheet + len(positions)])
         positions = np.vstack([positions, more])
         normal = np.vstack([normal, vertex_normals(more, sheet)])
-        tissue = np.vstack([tissue, np.column_stack([np.ones(len(more)), lumpy])])
+        tissue = np.vstack([tissue, own_tissue])
     return Eye(
         positions.astype(np.float32),
         normal.astype(np.float32),
@@ -86,7 +87,9 @@ def _grid(rows: int, columns: int, closed: bool) -> np.ndarray:
 
 
 def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.ndarray]:
-    """The sheet in the inner corner: points (ACROSS UP, 3) mm, how much of each is caruncle."""
+    """The sheet in the inner corner: points (ACROSS UP, 3) mm, and of each (ACROSS UP, 2) how much
+    is flesh, above 0, and how much caruncle. It goes over into the sclera where it meets the ball.
+    """
     side = 1.0 if ball.centre[0] > 0 else -1.0
     x_in = side * (opening.x[0] if side > 0 else opening.x[-1])  # the inner corner, below 0
     deep = opening.corners[0 if side > 0 else 1]
@@ -113,4 +116,8 @@ def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.n
     above = z - front
     z = z + 0.5 * size * np.exp(-((above - 0.5) ** 2) / 0.30)
     local = np.stack([side * x, y, z], axis=2).reshape(-1, 3)
-    return ball.centre + local, np.clip(1.2 * lump, 0, 1).ravel()
+    t = np.clip((z - front - PLICA_MM[0]) / (PLICA_MM[1] - PLICA_MM[0]), 0, 1)
+    flesh = PALE + (1 - PALE) * t * t * (3 - 2 * t)
+    lump = np.clip(1.2 * lump, 0, 1)
+    tissue = np.stack([np.maximum(flesh, lump), lump], axis=2).reshape(-1, 2)
+    return ball.centre + local, tissue

@@ -9,8 +9,12 @@ from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.lids import Eyeball, Opening
 from stimuli.heads.person import Hair, Lashes
 
-RIM_MM = 0.75  # of the roots from the edge that lies on the ball, seen from the front
-BARE_MM = 4.6  # from the inner corner: over the lake of tears no lash grows
+# of the roots from the edge that lies on the ball, seen from the front: the upper lid's margin
+# looks down, the lower one's up
+RIM_UPPER_MM, RIM_LOWER_MM = 0.28, 0.80
+TIP = 0.12  # of the width at the root
+SHADED = (0.85, 0.5)  # `cover` at root and tip: lashes stand in each other's and the brow's shade
+BARE_MM = 5.2  # from the inner corner: over the lake of tears no lash grows
 DARKER = 0.6  # of the hair's colour
 
 
@@ -81,7 +85,7 @@ def _lid(
     along = np.clip(along, first, last)
     u = (along - first) / (last - first)
     low, high = opening.at(side * along)
-    row = RIM_MM + 0.22 * rng.random(count)
+    row = (RIM_UPPER_MM if upper else RIM_LOWER_MM) + 0.25 * rng.random(count)
     y = high + row if upper else low - row
     at, vertex = _roots(ball, opening, mesh, side * along, y)
     if len(at) < count:  # the landmarks do not fit this head
@@ -96,8 +100,8 @@ def _lid(
     # outwards like spokes of the ball, more so towards the temple; tips of a tuft lean together
     spoke = np.radians(-22 + 62 * u) + np.radians(8.0) * tuft_turn[of]
     spoke += np.radians(7.0) * rng.normal(size=count) - 0.25 * spread
-    rise = np.radians((-12.0 if upper else -26.0) + 5.0 * rng.normal(size=count))
-    turn = np.radians(62.0 if upper else -34.0) * (own.curl if upper else 1.0)
+    rise = np.radians((-22.0 if upper else -26.0) + 5.0 * rng.normal(size=count))
+    turn = np.radians(74.0 if upper else -34.0) * (own.curl if upper else 1.0)
     turn = turn * (1 + 0.18 * tuft_curl[of] + 0.10 * rng.normal(size=count))
     s = np.linspace(0, 1, points)
     angle = rise[:, None] + turn[:, None] * s[None] ** 0.9
@@ -110,6 +114,7 @@ def _lid(
         "points": at[:, None] + grown_out,
         "width_mm": width,
         "colour": colour * np.exp(0.15 * rng.normal(size=(count, 1))),
-        "cover": np.full((count, points), 0.2),
+        "cover": np.tile(np.linspace(*SHADED, points), (count, 1)),
         "root_vertex": vertex,
+        "tip": np.full(count, TIP),
     }

@@ -3,10 +3,12 @@
 The base mesh's eyes are large (its balls have a radius of 14 to 15 mm, its openings end some 5 mm
 before the inner corner). `fitted` measures the opening on the finest level, moves the skin about
 it so that the opening has a person's width and height and its edges lie on a ball of a person's
-radius, and thins the lids. Coordinates called local are those of the ball's frame: mm from its
-centre, axes of the head. Sizes of adults: opening 28 to 30 mm by 9 to 11, Read et al. 2006,
-"Influence of eyelid position on the optical characteristics of the eye"; radius of the ball 12 mm,
-Bekerman et al. 2014, doi:10.1155/2014/503645; thickness of the margin 2 mm, Duke-Elder 1961.
+radius, thins the lids and lays the upper one's fold over its crease. Coordinates called local are
+those of the ball's frame: mm from its centre, axes of the head. Sizes of adults: opening 28 to 30
+mm by 9 to 11, Read et al. 2006, "Influence of eyelid position on the optical characteristics of the
+eye"; upper edge 4 to 4.5 mm above the pupil's middle, Putterman 2012, "Margin reflex distance (MRD)
+1, 2, and 3"; radius of the ball 12 mm, Bekerman et al. 2014, doi:10.1155/2014/503645; thickness of
+the margin 2 mm, Duke-Elder 1961.
 """
 
 from __future__ import annotations
@@ -28,7 +30,10 @@ EASED_MM, EASED_ROUNDS = 9.0, 40  # about the inner corner, where skin is smooth
 CLEAR_MM = 0.05  # of skin from the ball
 LATERAL_MM = 0.5  # of the outer corner from the ball's side
 UPPER_SHARE = 0.62  # of the opening's height, above the line between the corners
-UPPER, LOWER = (1.0, 0.85), (1.2, 0.75)  # powers of the distance from either corner, nose first
+UPPER, LOWER = (1.05, 1.0), (1.25, 0.95)  # powers of the distance from either corner, nose first
+CREASE_SOFT_MM, CREASE_HALF_MM = 1.0, 0.4  # over which the fold rises; half the crease's width
+FOLD_FADES_MM = 4.5  # above that, the fold's fullness falls by e
+FOLD_DOWN = 0.45  # over the crease, a mm that it is full
 REGION_MM = 32.0  # about the ball's centre, that is moved
 MAP_MM = (40.0, 24.0)  # width and height of an edge map about the ball's centre
 MAP_SIZE = (200, 120)  # its texels
@@ -58,6 +63,14 @@ class Opening:
     @property
     def height_mm(self) -> float:
         return float((self.upper - self.lower).max())
+
+    @property
+    def reflex_mm(self) -> tuple[float, float]:
+        """Margin reflex distances MRD1 and MRD2, mm: of the upper and of the lower edge from the
+        middle of the pupil of an eye that looks straight ahead.
+        """
+        lower, upper = self.at(np.zeros(1))
+        return float(upper[0]), float(-lower[0])
 
     @property
     def width_mm(self) -> float:
@@ -166,11 +179,16 @@ class _Shape:
         if side < 0:
             x, lower, upper = -x[::-1], lower[::-1], upper[::-1]
         self.measured = Opening(x, lower, upper, measured.corners)
-        # the ball's height: the pupil stands where the upper lid hides more of the iris
         self.lateral = own.radius_mm - LATERAL_MM
         self.medial = self.lateral - own.opening_width_mm
-        self.corners = lower[0], lower[-1]  # heights; there both edges meet
-        self.line = float(np.mean([edge[0] for edge in self.goal(np.zeros(1))])) + own.ball_lift_mm
+        # one upper lid stands a little higher than the other
+        uneven = 0.5 * side * own.lid_asymmetry_mm
+        self.height = own.opening_height_mm + uneven
+        # heights of the corners; there both edges meet
+        raised = 0.5 * own.canthal_tilt_mm
+        self.corners = lower[0] - raised, lower[-1] + raised
+        # the pupil stands as far below the upper edge as the person asks
+        self.line = float(self.goal(np.zeros(1))[1][0]) - own.mrd1_mm - uneven
         # the inner edges, which lie on the base mesh's ball made smaller, lie on the new one
         self.contact = CONTACT * ball.radius
         across = np.linspace(-0.3, 0.5, 9) * own.radius_mm
@@ -228,13 +246,14 @@ class _Shape:
         t = np.clip((x - self.medial) / (self.lateral - self.medial), 0, 1)
         line = self.corners[0] + t * (self.corners[1] - self.corners[0])
         lower, upper = was.at(self._place(x))
-        size = own.opening_height_mm / was.height_mm
+        was_line = was.lower[0] + t * (was.lower[-1] - was.lower[0])
+        size = self.height / was.height_mm
         edges = []
         for edge, power, share in ((lower, LOWER, -1 + UPPER_SHARE), (upper, UPPER, UPPER_SHARE)):
             a, b = power
             top = (a / (a + b)) ** a * (b / (a + b)) ** b
-            almond = share * own.opening_height_mm * t**a * (1 - t) ** b / top
-            edges.append(line + almond + (1 - own.almond) * (size * (edge - line) - almond))
+            almond = share * self.height * t**a * (1 - t) ** b / top
+            edges.append(line + almond + (1 - own.almond) * (size * (edge - was_line) - almond))
         return edges[0], edges[1]
 
     def moved(self, points: np.ndarray) -> np.ndarray:
@@ -277,6 +296,32 @@ class _Shape:
         thin *= (1 - _step(0.0, 10.0, beyond)) * (1 - _step(3.5, 9.0, height))
         front = _step(-3.0, 4.0, z)
         return np.column_stack([new_x, new_y, z + edge * front * (forward - thin * height)])
+
+
+def _folded(points: np.ndarray, shape: _Shape, own: Eyes) -> np.ndarray:
+    """Points (N, 3) with the upper lid's crease, and above it the fold of skin that hangs over it.
+
+    The fold is fullest just above the crease and goes over into the brow.
+    """
+    local = (points - shape.ball.centre) * [shape.side, 1, 1]
+    distance = np.linalg.norm(local, axis=1)
+    near = np.flatnonzero((distance < 2.2 * own.radius_mm) & (local[:, 2] > 0))
+    p, distance = local[near], distance[near]
+    t = (p[:, 0] - shape.medial) / (shape.lateral - shape.medial)
+    above = p[:, 1] + shape.line - shape.goal(p[:, 0])[1]  # the upper edge
+    arch = np.sin(np.pi * np.clip(t, 0, 1))
+    up = above - own.crease_mm * (0.35 + 0.65 * arch**0.8)
+    share = _step(0.05, 0.45, t) * (1 - _step(0.70, 1.15, t))
+    share *= _step(0.7, 1.5, distance - own.radius_mm)  # the lid's outside
+    full = _step(-0.1, CREASE_SOFT_MM, up)
+    full *= np.exp(-((np.maximum(up - CREASE_SOFT_MM, 0) / FOLD_FADES_MM) ** 2))
+    groove = np.exp(-(((up + 0.1) / CREASE_HALF_MM) ** 2))
+    towards = p / distance[:, None] * [1.0, 0.3, 1.0] - [0.0, FOLD_DOWN, 0.0]
+    hangs = own.fold_mm * (share * full)[:, None] * towards
+    sinks = own.crease_depth_mm * (share * groove / distance)[:, None] * p
+    result = points.copy()
+    result[near] += (hangs - sinks) * [shape.side, 1, 1]
+    return result
 
 
 def clear(points: np.ndarray, ball: Eyeball, own: Eyes, gaze: np.ndarray) -> np.ndarray:
@@ -337,7 +382,8 @@ def fitted(
         measured = opening(points, faces, ball)
         shape = None if measured is None else _Shape(ball, measured, own)
         if shape is not None:
-            points = _eased(shape.moved(points), faces, shape)
+            points = _folded(shape.moved(points), shape, own)
+            points = _eased(points, faces, shape)
             points = clear(points, shape.ball, own, own.direction)
         new.append(ball if shape is None else shape.ball)
     return points, new, [opening(points, faces, ball) for ball in new]

@@ -31,27 +31,29 @@ class Eyes(Parameters):
         12.0, unit="mm", low=10.0, high=14.0, source="Bekerman et al. 2014, 10.1155/2014/503645"
     )
     iris_mm: float = parameter(
-        5.9,
+        5.7,
         unit="mm, radius",
         low=4.5,
         high=6.5,
-        source="Rufer et al. 2005: 11.71 mm white to white",
+        source="Rufer et al. 2005: 11.71 +- .42 mm white to white; on heads as small as these",
     )
     pupil_mm: float = parameter(
         1.6, unit="mm, radius", low=0.5, high=4.0, source="Watson and Yellott 2012, in bright light"
     )
-    iris: tuple[float, float, float] = parameter((0.11, 0.145, 0.135), source="by eye", **_COLOUR)
-    fibres: tuple[float, float, float] = parameter((0.20, 0.215, 0.17), source="by eye", **_COLOUR)
+    iris: tuple[float, float, float] = parameter((0.055, 0.075, 0.070), source="by eye", **_COLOUR)
+    fibres: tuple[float, float, float] = parameter(
+        (0.105, 0.118, 0.092), source="by eye", **_COLOUR
+    )
     collarette: tuple[float, float, float] = parameter(
-        (0.26, 0.16, 0.065), source="by eye", **_COLOUR
+        (0.13, 0.078, 0.030), source="by eye", **_COLOUR
     )
     limbus_mm: float = parameter(
-        0.9, unit="mm, width of the dark ring's edge", low=0.1, high=3.0, source="by eye"
+        1.1, unit="mm, width of the dark ring's edge", low=0.1, high=3.0, source="by eye"
     )
     limbus: float = parameter(
         0.5, unit="share of light that the ring takes", low=0.0, high=1.0, source="by eye"
     )
-    sclera: tuple[float, float, float] = parameter((0.47, 0.405, 0.385), source="by eye", **_COLOUR)
+    sclera: tuple[float, float, float] = parameter((0.41, 0.355, 0.320), source="by eye", **_COLOUR)
     veins: float = parameter(1.0, unit="of their strength", low=0.0, high=4.0, source="by eye")
     redness: float = parameter(
         1.0, unit="of the corners' redness", low=0.0, high=4.0, source="by eye"
@@ -64,22 +66,51 @@ class Eyes(Parameters):
         0.0, unit="degrees up", low=-25.0, high=25.0, source="straight ahead"
     )
     opening_width_mm: float = parameter(
-        25.0, unit="mm", low=18.0, high=34.0, source="adults 28 to 30, on heads as small as these"
+        26.0, unit="mm", low=18.0, high=34.0, source="adults 28 to 30, on heads as small as these"
     )
     opening_height_mm: float = parameter(
-        8.3, unit="mm", low=3.0, high=14.0, source="adults 9 to 11, relaxed less"
+        8.4, unit="mm", low=3.0, high=14.0, source="adults 9 to 11, relaxed less"
+    )
+    mrd1_mm: float = parameter(
+        3.2,
+        unit="mm, upper lid's edge above the pupil's middle",
+        low=0.0,
+        high=7.0,
+        source="Putterman 2012: 4 to 4.5 in adults; relaxed, and on small heads, less",
+    )
+    lid_asymmetry_mm: float = parameter(
+        0.3,
+        unit="mm, the left upper lid higher than the right",
+        low=-2.0,
+        high=2.0,
+        source="by eye; up to 1 is usual",
+    )
+    canthal_tilt_mm: float = parameter(
+        0.6,
+        unit="mm, the outer corner higher than the base mesh's",
+        low=-4.0,
+        high=4.0,
+        source="by eye; adults' stands 1 to 2 above the inner",
     )
     almond: float = parameter(
-        0.7, unit="share, over the base mesh's own shape", low=0.0, high=1.0, source="by eye"
+        0.9, unit="share, over the base mesh's own shape", low=0.0, high=1.0, source="by eye"
     )
     lid_thickness: float = parameter(
         0.44, unit="of the base mesh's 3.3 mm", low=0.3, high=1.5, source="by eye; adults 2 mm"
     )
-    ball_lift_mm: float = parameter(
-        0.8, unit="mm above the opening's middle", low=-2.0, high=3.0, source="by eye"
+    crease_mm: float = parameter(
+        2.8,
+        unit="mm above the upper edge, as far as that shows",
+        low=0.5,
+        high=8.0,
+        source="by eye; 3 to 4 of the lid's 8 to 10 show",
+    )
+    crease_depth_mm: float = parameter(0.45, unit="mm", low=0.0, high=2.0, source="by eye")
+    fold_mm: float = parameter(
+        2.0, unit="mm, fullness above the crease", low=-2.0, high=5.0, source="by eye"
     )
     lid_shade: float = parameter(
-        0.5, unit="share of light at the upper lid's edge", low=0.0, high=1.0, source="by eye"
+        0.62, unit="share of light at the upper lid's edge", low=0.0, high=1.0, source="by eye"
     )
     lid_shade_mm: float = parameter(
         2.4, unit="mm, over which it falls by e", low=0.2, high=10.0, source="by eye"
@@ -104,12 +135,12 @@ class Lashes(Parameters):
 
     called: ClassVar[str] = "lashes"
 
-    upper: int = parameter(165, unit="hairs", low=0, high=1000, source="Na et al. 2006: 90 to 160")
-    lower: int = parameter(80, unit="hairs", low=0, high=1000, source="Na et al. 2006: 75 to 80")
+    upper: int = parameter(130, unit="hairs", low=0, high=1000, source="Na et al. 2006: 90 to 160")
+    lower: int = parameter(70, unit="hairs", low=0, high=1000, source="Na et al. 2006: 75 to 80")
     tufts: float = parameter(2.6, unit="hairs a tuft", low=1.0, high=10.0, source="by eye")
-    upper_mm: float = parameter(6.4, unit="mm", low=0.5, high=16.0, source="adults 8 to 12")
-    lower_mm: float = parameter(3.6, unit="mm", low=0.5, high=12.0, source="adults 6 to 8")
-    width_mm: float = parameter(0.056, unit="mm, at the root", low=0.01, high=0.3, source="adults")
+    upper_mm: float = parameter(7.2, unit="mm", low=0.5, high=16.0, source="adults 8 to 12")
+    lower_mm: float = parameter(4.2, unit="mm", low=0.5, high=12.0, source="adults 6 to 8")
+    width_mm: float = parameter(0.068, unit="mm, at the root", low=0.01, high=0.3, source="adults")
     curl: float = parameter(
         1.0, unit="of the upper lashes' curve", low=0.0, high=2.5, source="by eye"
     )

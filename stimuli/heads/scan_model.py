@@ -21,6 +21,7 @@ MATCH_MM = (
 )
 EYE_MM = 12.0  # radius of a ball, for an average head
 LID_MM = 1.0  # thickness of a lid
+OUTWARD_MM = 1.5  # of the opening's middle, where the pupil stands (people's `[eyes]`)
 OPEN_MM = 4.0  # so far behind the face about it a socket is open
 LEVELS = 3  # of subdivision, at most
 FINE_LIMIT = 250_000  # faces: no finer above
@@ -130,8 +131,8 @@ def _masks(scan, p: np.ndarray, normals: np.ndarray) -> np.ndarray:
 def _sockets(p, faces, marks, scale: float) -> tuple[Eyeball, ...]:
     """The balls that open sockets want, left of the person first; none where one of both is closed.
 
-    Looked at from the front, a socket is where nothing is met near the lids' depth. A ball lies in
-    the middle of the opening and behind its rim, so that the lids lie on it.
+    Looked at from the front, a socket is where nothing is met near the lids' depth. A ball lies a
+    little outwards of the opening's middle and behind its rim, so that the lids lie on it.
     """
     import trimesh
     from scipy.ndimage import binary_dilation, label
@@ -157,7 +158,10 @@ def _sockets(p, faces, marks, scale: float) -> tuple[Eyeball, ...]:
         if not 40 * scale**2 < own.sum() * step**2 < 500 * scale**2:
             return ()
         rim = binary_dilation(own, iterations=2) & ~open_ & np.isfinite(depth)
-        x, y = across[own].mean(), down[own].mean()
+        tall = own.sum(axis=0)
+        ends = across[0, np.flatnonzero(tall > 0.3 * tall.max())[[0, -1]]]
+        x = ends.mean() + np.sign(marks[name][0]) * OUTWARD_MM * scale
+        y = down[own].mean()
         beside = (across[rim] - x) ** 2 + (down[rim] - y) ** 2
         near = beside < (0.95 * radius) ** 2
         if near.sum() < 10:

@@ -84,6 +84,32 @@ def pupil_by_rays(own, yaw, index):
     return hit & (np.hypot(q[..., 0], q[..., 1]) < own.pupil_mm)
 
 
+def beam_on_the_iris(own, towards, places):
+    """Irradiance of the iris at (x, 0) mm for x in places, over a beam's own: its rays counted."""
+    curve, index, side, half = 7.8, 1.336, np.linspace(-8, 8, 1600), 0.4
+    limbus = np.sqrt(own.radius_mm**2 - own.iris_mm**2)
+    cap = limbus - np.sqrt(curve**2 - own.iris_mm**2)
+    towards = np.array(towards)
+    a, b = np.meshgrid(side, side)
+    across = np.array([towards[2], 0, -towards[0]])
+    start = a[..., None] * across + b[..., None] * np.array([0, 1.0, 0]) + [0, 0, 3.0]
+    along = (start * towards).sum(axis=2)  # of rays about the middle of the cornea's sphere
+    under = along**2 - (start**2).sum(axis=2) + curve**2
+    hit = under > 0
+    p = start + (np.sqrt(np.where(hit, under, 0)) - along)[..., None] * towards
+    n, cosine = p / curve, (p * towards).sum(axis=2, keepdims=True) / curve
+    hit &= p[..., 2] > limbus - cap
+    bent = n * (cosine / index - np.sqrt(1 - (1 - cosine**2) / index**2)) - towards / index
+    z, root, pupil = curve - 3.65, limbus - cap - 0.35, curve - 3.65
+    for _ in range(8):
+        q = p + bent * ((z - p[..., 2]) / np.minimum(bent[..., 2], -0.1))[..., None]
+        t = np.clip(np.hypot(q[..., 0], q[..., 1]) / own.iris_mm, 0, 1)
+        z = pupil + (root - pupil) * t * t * (3 - 2 * t)
+    cell = (side[1] - side[0]) ** 2
+    near = [hit & (np.abs(q[..., 0] - x) < half) & (np.abs(q[..., 1]) < half) for x in places]
+    return np.array([each.sum() * cell / (2 * half) ** 2 for each in near])
+
+
 def overlap(a, b):
     return (a & b).sum() / (a | b).sum()
 
@@ -99,6 +125,21 @@ def test_the_pupil_is_where_snells_law_puts_it(yaw):
     assert inside.sum() > 200
     assert overlap(dark, inside) > 0.90
     assert overlap(dark, inside) > overlap(dark, pupil_by_rays(own, yaw, 1.0)) + 0.1
+
+
+@pytest.mark.parametrize("turn", [20.0, 45.0])
+def test_a_lamp_at_the_side_lights_the_iris_most_on_the_other_side(turn):
+    """Irradiance along the iris against rays of an even beam traced through the cornea."""
+    own = replace(PLAIN, meniscus_mm=0.0, lid_shade=0.0)
+    towards = (np.sin(np.radians(turn)), 0.0, np.cos(np.radians(turn)))
+    lamp = DistantLight(WHITE, shadow=False, direction=towards, radius_deg=1.0)
+    eye = eyeball(Eyeball(np.zeros(3), own.radius_mm), own)
+    light = seen(eye, lights=[lamp], environment=Environment())[0][SIZE // 2, :, 1]
+    # the cornea shows the iris larger by some 13 %
+    drawn = np.interp([-3.0, 0.0, 3.0], (np.arange(SIZE) + 0.5) / SIZE * FRAME_MM - 13, light)
+    traced = beam_on_the_iris(own, towards, [-2.65, 0.0, 2.65])
+    np.testing.assert_allclose(drawn / drawn[1], traced / traced[1], rtol=0.2)
+    assert drawn[0] > drawn[1] > drawn[2]
 
 
 def test_the_upper_lid_shades_the_ball_less_and_less_away_from_it():
