@@ -96,7 +96,10 @@ class AtlasTechnique(Technique):
     padding: texels by which charts are carried on beyond
     their borders, so that looking up between texels meets no foreign ones. seams: "stop" leaves a
     tap out that falls off its chart or lands on another (the middle stands for it); "published"
-    takes whatever lies there.
+    takes whatever lies there. coarse_mm: where texels are longer than this on the surface, filtered
+    light is looked up by a cubic B-spline (wholly at 1.5 times that length), else linearly: that
+    spreads light less, by 0.41 texels and not by 0.58 (standard deviation), but where an edge of
+    light crosses long texels aslant it shows teeth.
     """
 
     domain: ClassVar[str] = "atlas"
@@ -109,6 +112,13 @@ class AtlasTechnique(Technique):
     )
     padding: int = parameter(2, unit="texels", low=0, high=16, source="GPU Gems 3, sec. 14.4.2")
     seams: str = parameter("stop", choices=("stop", "published"), source="GPU Gems 3, sec. 14.4.2")
+    coarse_mm: float = parameter(
+        0.6,
+        unit="mm a texel",
+        low=1e-3,
+        high=1000.0,
+        source="by eye on the ear's rim; see docs/techniques.md",
+    )
 
     def filter(self, atlas: Atlas) -> gl.Texture:
         """The filtered light: RGBA, alpha 1 where the medium scatters."""
@@ -147,6 +157,8 @@ class AtlasTechnique(Technique):
                 "model": drawn.item.pose,
                 "filtered": filtered,
                 "irradiance": inputs.irradiance,
+                "texel_mm": atlas.given["texel_mm"],
+                "coarse_mm": self.coarse_mm,
                 "taps": float(self.taps()),
             }
             program.use(**program.accepts(values))

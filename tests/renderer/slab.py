@@ -148,6 +148,22 @@ def places(frame):
     return frame.view.eye + rays * depth[..., None], frame.surface.textures[0].read()[..., 3] > 0
 
 
+def slab_table(height_mm, tilt_deg=0.0, target_mm=(0.0, 0.0, 10.0), **material):
+    """A scene: a slab of 24 mm before a camera that sees height_mm of it."""
+    slab = {"shape": "slab", "size_mm": [24.0, 24.0, 20.0], "rotation_deg": [0.0, tilt_deg, 0.0]}
+    return {
+        "objects": {"slab": slab},
+        "materials": {"slab": {"medium": "deon_luebke", "albedo": [1.0, 1.0, 1.0], **material}},
+        "environment": {"ambient": [1.0, 1.0, 1.0]},
+        "camera": {
+            "framing": "slab",
+            "height_mm": height_mm,
+            "angle": "front",
+            "target_mm": list(target_mm),
+        },
+    }
+
+
 def surface_response(
     technique, light, tilt_deg=0.0, size=(240, 60), height_mm=5.0, within_mm=8.0, **material
 ):
@@ -161,18 +177,7 @@ def surface_response(
     along, normal = np.array(
         [[np.cos(turn), 0.0, -np.sin(turn)], [np.sin(turn), 0.0, np.cos(turn)]]
     )
-    slab = {"shape": "slab", "size_mm": [24.0, 24.0, 20.0], "rotation_deg": [0.0, tilt_deg, 0.0]}
-    table = {
-        "objects": {"slab": slab},
-        "materials": {"slab": {"medium": "deon_luebke", "albedo": [1.0, 1.0, 1.0], **material}},
-        "environment": {"ambient": [1.0, 1.0, 1.0]},
-        "camera": {
-            "framing": "slab",
-            "height_mm": height_mm,
-            "angle": "front",
-            "target_mm": (10.0 * normal).tolist(),
-        },
-    }
+    table = slab_table(height_mm, tilt_deg, (10.0 * normal).tolist(), **material)
 
     def given(place):
         return np.repeat(light(place @ along)[..., None], 3, axis=-1)
