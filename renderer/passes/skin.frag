@@ -23,14 +23,14 @@ uniform sampler2D skin_table;        // log albedo: columns blood, rows melanin,
 uniform vec2 skin_most; uniform float skin_thinnest; uniform float skin_blocks;
 uniform float melanin; uniform float blood; uniform float flush; uniform float mottling; uniform vec2 uneven;
 uniform float eyelid_blood; uniform float eyelid_epidermis; uniform vec2 lip_blood; uniform float lip_melanin; uniform float lip_epidermis;
-uniform float freckles; uniform float freckle_share; uniform float moles; uniform float mole_share; uniform float vessels; uniform float veins;
-uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 inside_colour;
-uniform float pore_darkness; uniform vec2 micro_mm;
+uniform float freckles; uniform float freckle_share; uniform float spots; uniform float spot_share; uniform vec2 spots_mm; uniform float red_spots; uniform float red_share; uniform float moles; uniform float mole_share; uniform float vessels; uniform float veins;
+uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 shaven_left; uniform vec3 inside_colour;
+uniform float pore_darkness; uniform vec2 micro_mm; uniform vec3 bumps_mm;
 uniform float f0_oily; uniform float roughness_lips; uniform float lobe_share_oily; uniform float oil_patches;
 uniform float pore_depth; uniform float furrow_depth; uniform float bump_height; uniform float wrinkle_depth; uniform float lip_folds;
 uniform float roughness_dry; uniform float roughness_oily;
 // Where wrinkles lie, mm (renderer/scene/material.py): vec4 and vec2 say where they set in, are whole, begin to end, have ended.
-uniform vec4 forehead_lines; uniform vec2 forehead_lines_half; uniform float forehead_lines_period;
+uniform vec4 forehead_lines; uniform vec2 forehead_lines_half; uniform float forehead_lines_period; uniform float forehead_lines_width;
 uniform vec2 crows_feet_place; uniform vec4 crows_feet; uniform vec2 crows_feet_angle;
 uniform vec4 lid_lines; uniform vec2 lid_lines_half; uniform float lid_lines_period;
 uniform vec2 wrinkles_behind;  // the eyes: on the forehead, around the eyes
@@ -44,8 +44,11 @@ float fade(float size_mm, float pixel_mm) { float r = pixel_mm / size_mm; return
 struct Relief { vec4 h; vec3 fine; float pore; float lost; };
 void lose(inout Relief r, float mean_square, float shown) { r.lost += mean_square * (1.0 - shown * shown); }
 
-// The nearest feature point, of those within half a cell: what small spots need, at a third of the price of `cells`.
+// The nearest feature point, of those within half a cell: what small spots need, at a third of the price of `cells`. Spots and pores
+// are drawn out along the surface's normal, or a plane would meet few of them: offsets along it count DRAWN_OUT.
 struct Spot { float f1; vec3 d1; uint id; };
+const float DRAWN_OUT = 0.45;
+vec3 inwards;  // the smooth surface's normal in the object's axes
 Spot spot(vec3 p) {
     ivec3 base = ivec3(floor(p - 0.5));
     Spot s; s.f1 = 9.0; s.d1 = vec3(0.0); s.id = 0u;
@@ -53,6 +56,7 @@ Spot spot(vec3 p) {
         ivec3 c = base + ivec3(k & 1, (k >> 1) & 1, k >> 2);
         uint h = hash3(c);
         vec3 d = p - (vec3(c) + 0.1 + 0.8 * unit3(h));
+        d -= (1.0 - DRAWN_OUT) * dot(d, inwards) * inwards;
         float q = dot(d, d);
         if (q < s.f1) { s.f1 = q; s.d1 = d; s.id = h; }
     }
@@ -73,8 +77,15 @@ void furrows(inout Relief r, vec3 q, mat3 net, float deep, float shown, float we
     r.h.yzw += weight * deep * shown * f * 2.0 * gap / (wide * wide) * d / 0.62;
 }
 
+// Noise over 1.6, 4.1 and 11 mm, with its gradient: bumps, and the blood below them.
+struct Waves { vec4 fine; vec4 middle; vec4 broad; };
+const vec3 WAVES_MM = vec3(1.6, 4.1, 11.0);
+Waves waves_at(vec3 q) {
+    return Waves(value_noise(q / WAVES_MM.x), value_noise(q / WAVES_MM.y + 7.0), value_noise(q / WAVES_MM.z + 3.0));
+}
+
 // Pores, furrows, bumps and wrinkles at p: height in mm and its gradient.
-Relief relief(vec3 p, float pixel_mm) {
+Relief relief(vec3 p, float pixel_mm, Waves waves) {
     float lips = lip_of(a.x), eyelid = a.w, pores = b.x, inside = b.w;
     vec3 q = p + noise_origin;
     Relief r; r.h = vec4(0.0); r.fine = vec3(0.0); r.pore = 0.0; r.lost = 0.0;
@@ -82,20 +93,20 @@ Relief relief(vec3 p, float pixel_mm) {
 
     // pores: two sizes of pits, of depths of their own, missing here and there
     for (int k = 0; k < 2; ++k) {
-        float size = k == 0 ? 0.92 : 0.60, w = k == 0 ? 0.26 : 0.22, shown = fade(size * 0.5, pixel_mm);
+        float size = k == 0 ? 0.92 : 0.60, w = k == 0 ? 0.22 : 0.18, shown = fade(size * 0.5, pixel_mm);
         Spot c = spot(q / size);
         float own = unit(mix_bits(c.id ^ 0x51u));
         own = own * step(0.15, own);
-        float depth = pore_depth * (k == 0 ? 0.066 : 0.030) * pores * own * skin;
+        float depth = pore_depth * (k == 0 ? 0.080 : 0.040) * pores * own * skin;
         float e = exp(-c.f1 * c.f1 / (w * w));
         r.h.x -= shown * depth * e;
         r.h.yzw += shown * depth * e * 2.0 / (w * w) * c.d1 / size;
-        r.pore += (k == 0 ? 1.0 : 0.6) * mix(0.19 * w, pow(e, 1.4), shown) * own * pores * skin;
-        float steep = pore_depth * (k == 0 ? 0.066 : 0.030) * pores * skin / size;
-        lose(r, 1.22 * w * steep * steep, shown);
+        r.pore += (k == 0 ? 1.0 : 0.6) * mix(7.2 * w * w * w, pow(e, 1.4), shown) * own * pores * skin;
+        float steep = pore_depth * (k == 0 ? 0.080 : 0.040) * pores * skin / size;
+        lose(r, 4.2 * w * steep * steep, shown);
     }
     // three fixed nets of furrows, by region: across on forehead and neck, down and outwards on cheeks, upright about the mouth
-    float deep = furrow_depth * 0.018 * skin * (1.0 - 0.6 * pores) * (1.0 - 0.5 * eyelid), shown = fade(0.5, pixel_mm);
+    float deep = furrow_depth * 0.030 * skin * (1.0 - 0.6 * pores) * (1.0 - 0.5 * eyelid), shown = fade(0.5, pixel_mm);
     lose(r, 54.0 * deep * deep, shown);
     if (deep * shown > 1e-4) {
         vec3 between = 0.5 * (eye_l + eye_r), off = p - between;
@@ -116,22 +127,24 @@ Relief relief(vec3 p, float pixel_mm) {
         if (seen > 0.08) r.fine += steep * seen * value_noise(q / size + 5.0 * float(k)).yzw;
     }
     vec4 h = r.h;
-    // bumps of 1.6, 4 and 11 mm
-    vec4 n1 = value_noise(q / 1.6), n2 = value_noise(q / 4.1 + 7.0), n3 = value_noise(q / 11.0 + 3.0);
-    float t1 = 0.026 * skin * fade(1.0, pixel_mm), t2 = 0.045 * skin, t3 = 0.16 * (1.0 - inside) * (1.0 - 0.6 * lips);
-    h += bump_height * (t1 * vec4(n1.x, n1.yzw / 1.6) + t2 * vec4(n2.x, n2.yzw / 4.1) + t3 * vec4(n3.x, n3.yzw / 11.0));
+    // bumps of 1.6, 4.1 and 11 mm
+    float seen = fade(1.0, pixel_mm);
+    vec3 high = bump_height * bumps_mm * vec3(skin * seen, skin, (1.0 - inside) * (1.0 - 0.6 * lips)), rise = high / WAVES_MM;
+    h += vec4(high.x * waves.fine.x + high.y * waves.middle.x + high.z * waves.broad.x,
+        rise.x * waves.fine.yzw + rise.y * waves.middle.yzw + rise.z * waves.broad.yzw);
+    lose(r, 1.17 * pow(bump_height * bumps_mm.x * skin / WAVES_MM.x, 2.0), seen);
 
-    // forehead: three faint lines that wander
+    // forehead: soft lines that wander and break off, each where it likes
     vec3 eyes = 0.5 * (eye_l + eye_r);
     vec3 f = p - eyes;
     float brow = smoothstep(forehead_lines.x, forehead_lines.y, f.y) * (1.0 - smoothstep(forehead_lines.z, forehead_lines.w, f.y))
         * (1.0 - smoothstep(forehead_lines_half.x, forehead_lines_half.y, abs(f.x))) * step(0.0, p.z - eyes.z + wrinkles_behind.x);
     if (brow > 0.0) {
-        vec4 warp = value_noise(vec3(q.x / 22.0, q.y / 34.0, 2.0));
-        float y = f.y + 3.0 * warp.x;
-        float period = forehead_lines_period, phase = fract(y / period) - 0.5, s = phase * period;
-        float strength = 0.5 + 0.5 * noise(vec3(q.x / 16.0, floor(y / period) * 3.1, 5.0));
-        float w = 0.9, g = exp(-s * s / (w * w)) * wrinkle_depth * 0.045 * strength * brow;
+        float period = forehead_lines_period, w = forehead_lines_width;
+        float y = f.y + 3.4 * noise(vec3(q.x / 22.0, q.y / 34.0, 2.0)) + 0.9 * waves.broad.x, line = floor(y / period);
+        float s = (fract(y / period) - 0.5) * period + 0.2 * period * noise(vec3(q.x / 60.0, line * 5.3, 8.0));
+        float strength = smoothstep(-0.25, 0.55, noise(vec3(q.x / 14.0, line * 3.1, 5.0)) + 0.35 * waves.middle.x);
+        float g = exp(-s * s / (w * w)) * wrinkle_depth * 0.060 * strength * brow;
         h.x -= g;
         h.z += g * 2.0 * s / (w * w);
     }
@@ -209,21 +222,23 @@ float mole_at(vec3 q, float skin, inout vec3 gradient) {
 
 // Skin colour: how much melanin and blood there is, and how thick the epidermis is above it, looked up in the spectral model; over an
 // albedo map the model says by how much more of them darken what it shows.
-vec3 colour(vec3 p, float pixel_mm, float pore, float mole, bool mapped, vec3 map) {
+vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool mapped, vec3 map) {
     float lips = lip_of(a.x), inner = seam_of(a.x), flushed = a.y, hair = a.z, eyelid = a.w, beard = beard_tint * b.z, inside = b.w;
     vec3 q = p + noise_origin;
     if (mapped) { lips = 0.0; inner = 0.0; flushed = 0.0; eyelid = 0.0; }
     float broad = noise(q / 24.0), patchy = noise(q / 9.0 + 4.0), small = noise(q / 3.2 + 40.0), fine = noise(q / 1.3 + 2.0) * fade(0.9, pixel_mm);
-    float red = noise(q / 21.0 + 21.0);
+    float red = noise(q / 21.0 + 21.0), tiny = noise(q / 0.9 + 77.0) * fade(0.6, pixel_mm);
+    float blotched = 0.30 * red + 0.30 * waves.broad.x + 0.45 * waves.middle.x + 0.65 * waves.fine.x * fade(1.0, pixel_mm) + 0.55 * tiny;
     // layer_mottling: how even it is; over a map all of this is the map's own
-    float m = melanin * (mapped ? 1.0 : max(1.0 + uneven.x * (0.55 * broad + 0.65 * patchy + 0.45 * small + 0.35 * fine), 0.2));
-    float h = blood + flush * flushed * max(1.0 + 0.8 * uneven.y * (red + patchy), 0.0) + eyelid_blood * eyelid;
-    if (!mapped) h *= max(1.0 + uneven.y * (0.7 * red + 0.5 * noise(q / 6.0 + 61.0)), 0.2);
+    float m = melanin * (mapped ? 1.0 : max(1.0 + uneven.x * (0.50 * broad + 0.65 * patchy + 0.80 * small + 0.85 * fine), 0.2));
+    float h = blood + flush * flushed * max(1.0 + 0.5 * uneven.y * (red + patchy), 0.0) + eyelid_blood * eyelid;
+    float varied = uneven.y * (0.5 + 0.5 * flushed);
+    if (!mapped) h *= exp(varied * blotched - 0.09 * varied * varied);  // 1 on average
     float thickness = mix(1.0, eyelid_epidermis, max(eyelid, 0.7 * min(flushed, 1.0)));  // where blood shows, it lies nearer
     float m0 = m, h0 = h;
     // capillary mottling, strongest where the skin is flushed
-    float mottled = 0.7 * small + 0.5 * fine + 0.4 * noise(q / 0.9 + 77.0) * fade(0.6, pixel_mm);
-    h += layer_mottling * mottling * (0.003 + 0.010 * flushed) * 1.2 * max(mottled, 0.0) * (1.0 - lips);
+    float mottled = 0.6 * waves.middle.x + 0.6 * small + 0.5 * fine + 0.4 * tiny;
+    h += layer_mottling * mottling * (0.003 + 0.012 * flushed) * 1.6 * max(mottled, 0.0) * (1.0 - lips);
     // fine vessels where it is flushed most
     float webbed = vessels * layer_mottling * smoothstep(0.55, 0.95, flushed + 0.25 * patchy) * fade(0.35, pixel_mm) * (1.0 - lips);
     if (webbed > 0.004) {
@@ -243,11 +258,23 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, bool mapped, vec3 ma
             vein = there * exp(-pow((v.f2 - v.f1) / 0.06, 2.0));
         }
     }
-    // freckles, most where the sun falls and blood shows
-    Spot c = spot(q / 7.5);
+    // freckles in clusters, most where the sun falls and blood shows: many are faint and few are dark
+    float bare = layer_freckles * (1.0 - lips);
+    Spot c = spot(q / 3.4);
     float one = unit(mix_bits(c.id ^ 3u)), of = unit(mix_bits(c.id ^ 5u));
-    if (one > 1.0 - freckle_share * (0.4 + 1.2 * flushed) && c.f1 < 0.24)
-        m += layer_freckles * freckles * (0.4 + 0.6 * of) * ragged(q, c.f1, mix(0.05, 0.13, of), 0.8) * (1.0 - lips);
+    float clustered = smoothstep(-0.45, 0.45, broad + 0.6 * patchy);
+    if (bare > 0.0 && one > 1.0 - freckle_share * (0.3 + 0.7 * clustered) * (0.5 + 0.5 * flushed) && c.f1 < 0.34)
+        m += bare * freckles * (0.25 + 0.75 * of) * ragged(q, c.f1, mix(0.07, 0.19, of), 0.6);
+    // a few larger spots: brown ones with a ragged border, red ones that fade out
+    if (bare * spot_share > 0.0) {
+        c = spot(q / 9.0 + 5.0);
+        one = unit(mix_bits(c.id ^ 17u)); of = unit(mix_bits(c.id ^ 19u));
+        float radius = mix(spots_mm.x, spots_mm.y, of * of) / 18.0;
+        if (one > 1.0 - spot_share && c.f1 < 2.2 * radius) {
+            if (unit(mix_bits(c.id ^ 23u)) < red_share) h += bare * red_spots * (0.5 + 0.5 * of) * exp(-2.0 * c.f1 * c.f1 / (radius * radius));
+            else m += bare * spots * (1.0 - 0.5 * of) * ragged(q, c.f1, radius, 9.0 * radius);
+        }
+    }
     m += moles * mole;
     // lips: redder towards the seam, under a thin epidermis
     float vermilion = mix(lip_blood.x, lip_blood.y, inner) * (1.0 + 0.20 * patchy + 0.22 * small + 0.16 * fine);
@@ -257,15 +284,15 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, bool mapped, vec3 ma
     // hair below the surface: scalp and shaven beard, dots that merge with distance
     hair = layer_hair * smoothstep(0.15, 1.0, hair);  // before the line hairs are too few to tint the skin
     beard *= layer_hair;
-    float rooted = clamp(hair + 0.75 * beard, 0.0, 1.0) * (0.75 + 0.25 * noise(q / 4.0)), dots = 0.10;
-    if (rooted > 0.02) {
+    float rooted = hair * (0.75 + 0.25 * noise(q / 4.0)), shaven = beard * (1.0 - hair) * clamp(0.75 + 0.35 * patchy + 0.35 * waves.middle.x, 0.0, 1.2), dots = 0.05;
+    if (max(rooted, shaven) > 0.02) {
         Spot d = spot(q / 0.62 + 8.0);
-        dots = mix(0.10, smoothstep(0.17, 0.07, d.f1), fade(0.45, pixel_mm));
+        dots = mix(0.05, smoothstep(0.24, 0.10, d.f1), fade(0.45, pixel_mm));
     }
     vec3 skin = skin_colour(m / thickness, h, thickness);  // melanin lies at the epidermis's base: a thin one has as much of it
     if (mapped) skin = map * skin / skin_colour(m0 / thickness, h0, thickness);
-    skin *= mix(vec3(1.0), scalp_left, hair * scalp_tint) * (1.0 - rooted * rooted_left - 0.45 * dots * rooted);
-    skin *= 1.0 - pore_darkness * min(pore, 1.0);
+    skin *= mix(vec3(1.0), scalp_left, hair * scalp_tint) * (1.0 - rooted * rooted_left - shaven * shaven_left - 0.45 * dots * max(rooted, 0.75 * shaven));
+    skin *= 1.0 - pore_darkness * vec3(0.85, 1.0, 1.1) * min(pore, 1.0);  // what is in them is brownish
     skin *= 1.0 - veins * layer_mottling * vein * vec3(0.13, 0.06, 0.02);  // red goes deepest, and is missing most (Kienle et al. 1996)
     return mapped ? skin : mix(skin, inside_colour, inside);
 }
@@ -358,11 +385,13 @@ void main() {
     if (has_height_map == 1) n = bumped(n);
     vec3 mirror = n;
     if (procedural == 1) {
+        inwards = normalize(smooth_n * mat3(model));
+        Waves waves = waves_at(local + noise_origin);
         if (layer_relief > 0.0 || layer_moles > 0.0) {
             vec3 raised = vec3(0.0);
             mole = mole_at(local + noise_origin, (1.0 - lip_of(a.x)) * (1.0 - b.w), raised);
             Relief r; r.h = vec4(0.0); r.fine = vec3(0.0); r.pore = 0.0; r.lost = 0.0;
-            if (layer_relief > 0.0) r = relief(local, pixel_mm);
+            if (layer_relief > 0.0) r = relief(local, pixel_mm, waves);
             shade = min(r.pore, 1.0);
             lost = r.lost;
             vec3 slope = mat3(model) * (r.h.yzw + raised) / length(model[0].xyz);  // relief grows with its object
@@ -370,10 +399,10 @@ void main() {
             mirror = normalize(n - (finer - n * dot(finer, n)));
             n = normalize(n - (slope - n * dot(slope, n)));
         }
-        albedo = colour(local, pixel_mm, shade, mole, has_albedo_map == 1, albedo);
+        albedo = colour(local, pixel_mm, shade, mole, waves, has_albedo_map == 1, albedo);
         if (layer_oil > 0.0) {
             vec3 q = local + noise_origin;
-            float patches = 0.45 * noise(q / 21.0 + 91.0) + 0.40 * noise(q / 7.0 + 87.0) + 0.30 * noise(q / 2.0 + 83.0) * fade(1.4, pixel_mm);
+            float patches = 0.45 * noise(q / 21.0 + 91.0) + 0.40 * noise(q / 7.0 + 87.0) + 0.45 * noise(q / 2.0 + 83.0) * fade(1.4, pixel_mm);
             float lips = lip_of(a.x);
             float oil = clamp(b.y * (1.0 + oil_patches * patches) - 0.35 * shade, 0.0, 1.0);
             m = mix(mix(roughness_dry, roughness_oily, oil), roughness_lips * mix(1.15, 0.85, seam_of(a.x)), lips);

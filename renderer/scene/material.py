@@ -21,10 +21,13 @@ MAPS = ("albedo_map", "normal_map", "roughness_map", "height_map", "specular_map
 LAYERS = ("relief", "freckles", "moles", "mottling", "hair", "oil")
 _SHARE = {"low": 0.0, "high": 1.0}
 # Means of the shader's noises, by integration: of a freckle's cell, of the positive part of four
-# octaves, of the dots below the surface.
-FRECKLE_AREA, MOTTLING_MEAN, DOTS_MEAN = 0.01, 0.15, 0.10
+# octaves, of the dots below the surface; of a brown and a red spot's cell over the cube of the sum
+# of their least and largest size.
+FRECKLE_MEAN, MOTTLING_MEAN, DOTS_MEAN = 0.0074, 0.27, 0.05
+BROWN_MEAN, RED_MEAN = 6.0e-5, 6.9e-5
 # What hair in and over the skin leaves of its colour, and the colour of the mouth's inside.
 SCALP, ROOTED, INSIDE = (0.22, 0.21, 0.21), (0.36, 0.32, 0.27), (0.22, 0.06, 0.06)
+SHAVEN = (0.21, 0.15, 0.09)  # what roots below shaven skin take of its colour: red most
 #: The medium of a skin that follows from its own pigments.
 PERSON = "person"
 
@@ -181,7 +184,7 @@ class Skin(Material):
     flush: float = parameter(0.026, unit="share of blood more", low=0.0, high=0.3, source="by eye")
     mottling: float = parameter(1.0, low=0.0, high=5.0, source="of what was chosen by eye")
     uneven: tuple[float, float] = parameter(
-        (0.22, 0.26), unit="of melanin, of blood", low=0.0, high=2.0, source="by eye"
+        (0.32, 0.44), unit="of melanin, of blood", low=0.0, high=2.0, source="by eye"
     )
     eyelid_blood: float = parameter(
         0.006, unit="share of blood more", low=0.0, high=0.3, source="by eye"
@@ -200,9 +203,20 @@ class Skin(Material):
     lip_melanin: float = parameter(0.45, source="of the skin's melanin, by eye", **_SHARE)
     lip_epidermis: float = parameter(0.40, source="of the epidermis, by eye", low=0.1, high=1.0)
     freckles: float = parameter(
-        0.030, unit="share of melanin more", low=0.0, high=0.6, source="by eye"
+        0.035, unit="share of melanin more", low=0.0, high=0.6, source="by eye"
     )
-    freckle_share: float = parameter(0.28, source="of cells of 7.5 mm, by eye", **_SHARE)
+    freckle_share: float = parameter(0.45, source="of cells of 3.4 mm, by eye", **_SHARE)
+    spots: float = parameter(
+        0.05, unit="share of melanin more", low=0.0, high=0.6, source="larger ones, by eye"
+    )
+    spot_share: float = parameter(0.40, source="of cells of 9 mm, red ones too, by eye", **_SHARE)
+    spots_mm: tuple[float, float] = parameter(
+        (0.9, 3.2), unit="mm across: least, largest", low=0.1, high=9.0, source="by eye"
+    )
+    red_spots: float = parameter(
+        0.045, unit="share of blood more", low=0.0, high=0.3, source="by eye"
+    )
+    red_share: float = parameter(0.45, source="of the spots, by eye", **_SHARE)
     moles: float = parameter(0.25, unit="share of melanin more", low=0.0, high=0.6, source="by eye")
     mole_share: float = parameter(0.20, source="of cells of 31 mm, by eye", **_SHARE)
     vessels: float = parameter(
@@ -217,11 +231,18 @@ class Skin(Material):
     )
     beard: float = parameter(1.0, low=0.0, high=1.3, source="tint of shaven skin, by eye")
     scalp: float = parameter(0.9, source="darkening under hair, by eye", **_SHARE)
-    pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.066 and 0.030 mm")
-    pore_shade: float = parameter(0.30, source="how much darker a deep pore is, by eye", **_SHARE)
-    furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.018 mm")
-    bumps: float = parameter(1.0, low=0.0, high=5.0, source="height, of 0.022 to 0.16 mm")
-    wrinkles: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.020 to 0.045 mm")
+    pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.080 and 0.040 mm")
+    pore_shade: float = parameter(0.48, source="how much darker a deep pore is, by eye", **_SHARE)
+    furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.030 mm")
+    bumps: float = parameter(1.0, low=0.0, high=5.0, source="height, of `bumps_mm`")
+    bumps_mm: tuple[float, float, float] = parameter(
+        (0.042, 0.085, 0.20),
+        unit="mm over 1.6, 4.1 and 11 mm",
+        low=0.0,
+        high=1.0,
+        source="by eye: a mean roughness of 15 to 30 µm over the first two",
+    )
+    wrinkles: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.020 to 0.060 mm")
     lip_folds: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.050 mm")
     micro_mm: tuple[float, float] = parameter(
         (0.030, 0.018),
@@ -234,10 +255,10 @@ class Skin(Material):
         0.035, low=0.0, high=1.0, source="Fresnel at an index of 1.46, of sebum"
     )
     roughness_dry: float = parameter(
-        0.34, unit="Beckmann slope", low=0.02, high=1.0, source="between relief, by eye"
+        0.31, unit="Beckmann slope", low=0.02, high=1.0, source="between relief, by eye"
     )
     roughness_oily: float = parameter(
-        0.21, unit="Beckmann slope", low=0.02, high=1.0, source="between relief, by eye"
+        0.15, unit="Beckmann slope", low=0.02, high=1.0, source="between relief, by eye"
     )
     roughness_lips: float = parameter(
         0.18, unit="Beckmann slope", low=0.02, high=1.0, source="moist, by eye"
@@ -246,7 +267,7 @@ class Skin(Material):
         (0.55, 1.35), unit="of the roughness", low=0.1, high=3.0, source="by eye"
     )
     lobe_share: float = parameter(0.80, source="of the broad lobe on dry skin, by eye", **_SHARE)
-    lobe_share_oily: float = parameter(0.45, source="of it on oily skin, by eye", **_SHARE)
+    lobe_share_oily: float = parameter(0.32, source="of it on oily skin, by eye", **_SHARE)
     oil_patches: float = parameter(
         0.55, low=0.0, high=2.0, source="of the oil there is, over 21, 7 and 2 mm, by eye"
     )
@@ -254,6 +275,9 @@ class Skin(Material):
     forehead_lines_mm: tuple[float, float, float, float] = _band(24.0, 32.0, 58.0, 66.0)
     forehead_lines_half_mm: tuple[float, float] = _band(32.0, 50.0)
     forehead_lines_period_mm: float = _period(10.5)
+    forehead_lines_width_mm: float = parameter(
+        1.6, unit="mm, half width", low=0.2, high=20.0, source="by eye"
+    )
     crows_feet_place_mm: tuple[float, float] = parameter(
         (17.0, -1.0), unit="mm outwards and above", low=-50.0, high=50.0, source="by eye"
     )
@@ -304,11 +328,14 @@ class Skin(Material):
         column = {name: masks[:, k] for k, name in enumerate(MASKS)}
         lips, inner = lip_places(column["lips"])
         eyelid, flushed = column["eyelid"], column["flush"]
-        freckles = self.freckles * self.freckle_share * FRECKLE_AREA * (1 - lips)
-        freckles = freckles * (0.4 + 1.2 * flushed)
+        freckles = self.freckles * self.freckle_share * (0.5 + 0.5 * flushed) * FRECKLE_MEAN
+        spots = self.spot_share * sum(self.spots_mm) ** 3
+        brown, red = (1 - self.red_share) * BROWN_MEAN, self.red_share * RED_MEAN
+        freckles = (freckles + self.spots * brown * spots) * (1 - lips)
         melanin = self.melanin * (1 + (self.lip_melanin - 1) * lips) + freckles
         blood = self.blood + self.flush * flushed + self.eyelid_blood * eyelid
-        blood = blood + self.mottling * (0.003 + 0.010 * flushed) * MOTTLING_MEAN
+        blood = blood + self.mottling * (0.003 + 0.012 * flushed) * MOTTLING_MEAN
+        blood = blood + self.red_spots * red * spots
         border, seam = self.lip_blood
         blood = blood + lips * (border + (seam - border) * inner - blood)
         thin = 1 + (self.eyelid_epidermis - 1) * np.maximum(eyelid, 0.7 * flushed)
@@ -320,9 +347,10 @@ class Skin(Material):
         column = {name: masks[:, k : k + 1] for k, name in enumerate(MASKS)}
         albedo = skin.shown(self.layers, *self.pigments(masks))
         hair = _smoothstep(0.15, 1.0, column["hair"])
-        rooted = 0.75 * np.clip(hair + 0.75 * self.beard * column["beard"], 0, 1)
+        rooted, shaven = 0.75 * hair, 0.75 * self.beard * column["beard"] * (1 - hair)
         albedo = albedo * (1 + self.scalp * hair * (np.array(SCALP) - 1))
-        albedo = albedo * (1 - rooted * np.array(ROOTED) - 0.45 * DOTS_MEAN * rooted)
+        dots = 0.45 * DOTS_MEAN * np.maximum(rooted, 0.75 * shaven)
+        albedo = albedo * (1 - rooted * np.array(ROOTED) - shaven * np.array(SHAVEN) - dots)
         return albedo + column["inside"] * (np.array(INSIDE) - albedo)
 
     def own_medium(self, masks: np.ndarray, share: np.ndarray) -> dict:

@@ -304,22 +304,32 @@ def _skin(rng, sex: str, age: float, tone: float, light: float, hair) -> dict[st
     melanin = float(np.exp(low + tone * (high - low)))
     red = hair[0] > 2.2 * hair[1] and hair[0] > 0.1
     oily = rng.uniform(0, 1)
+    aged = float(np.clip((age - 30) / 45, 0, 1))
     table: dict[str, Any] = {
         "melanin": _rounded(melanin, 4),
         "blood": _rounded(rng.uniform(0.009, 0.015) + 0.004 * tone, 4),
         "eumelanin": _rounded(np.clip(0.35 + 0.45 * tone - (0.2 if red else 0), 0, 1), 2),
         "epidermis_mm": _rounded(rng.uniform(0.07, 0.10), 3),
         "flush": _rounded(rng.uniform(0.016, 0.032) * (1 + 0.3 * light), 4),
-        "freckles": _rounded(rng.uniform(0.03, 0.09) if red else rng.uniform(0.0, 0.035)),
-        "freckle_share": _rounded(0.6 if red else rng.uniform(0.1, 0.3), 2),
+        "uneven": [
+            _rounded((0.38 - 0.22 * tone) * rng.uniform(0.75, 1.1) + 0.06 * aged),
+            _rounded(rng.uniform(0.30, 0.46) + 0.08 * aged),
+        ],
+        "freckles": _rounded(rng.uniform(0.03, 0.05) if red else rng.uniform(0.0, 0.03)),
+        "freckle_share": _rounded(rng.uniform(0.6, 1.0) if red else rng.uniform(0.1, 0.4), 2),
+        "spots": _rounded(rng.uniform(0.03, 0.05) + 0.07 * tone),
+        "spot_share": _rounded(rng.uniform(0.1, 0.4) + 0.5 * aged, 2),
+        "spots_mm": [0.9, _rounded(rng.uniform(1.8, 2.6) + 2.2 * aged, 2)],
+        "red_share": _rounded(rng.uniform(0.25, 0.5) * (1 - tone), 2),
         "lip_melanin": _rounded(0.45 + 0.3 * tone, 2),
         "moles": _rounded(rng.uniform(0.15, 0.35), 2),
         "mole_share": _rounded(rng.uniform(0.08, 0.28), 2),
         "mottling": _rounded(rng.uniform(0.7, 1.2) + 0.4 * np.clip((age - 45) / 30, 0, 1), 2),
+        "bumps": _rounded(rng.uniform(0.7, 1.0) + 0.3 * aged, 2),
         "wrinkles": _rounded(np.clip((age - 18) / 40, 0.15, 1.6), 2),
         "pores": _rounded(rng.uniform(0.65, 0.95) + 0.25 * (sex == "male"), 2),
-        "roughness_dry": _rounded(0.37 - 0.04 * oily, 3),
-        "roughness_oily": _rounded(0.25 - 0.04 * oily, 3),
+        "roughness_dry": _rounded(0.35 - 0.06 * oily, 3),
+        "roughness_oily": _rounded(0.19 - 0.07 * oily, 3),
     }
     if sex == "female":
         table["beard"] = 0.0

@@ -63,12 +63,12 @@ _WEIGHTS = {
         "neck": -0.15,
     },
     "oil": {
-        "everywhere": 0.25,
-        "nose": 0.55,
+        "everywhere": 0.27,
+        "nose": 0.68,
         "wings": 0.45,
-        "forehead": 0.45,
-        "cheeks": 0.20,
-        "chin": 0.20,
+        "forehead": 0.50,
+        "cheeks": 0.28,
+        "chin": 0.30,
         "neck": -0.2,
     },
     "smooth": {"eyelids": 0.85, "ears": 0.6},
@@ -116,7 +116,9 @@ class Regions(Parameters):
     line_noise_scale_mm. Ramps say where something begins and where it is whole: *_soft_mm across a
     line, forehead_mm, chest_mm and neck_mm above the eyes (the forehead's end too), chest_half_mm
     and forehead_deg to the sides, beard_front_mm along z; a person's `hairline_mm` counts in full
-    within hairline_deg[1]. In two spots of beard_thin_mm the share beard_thin of it is missing.
+    within hairline_deg[1]. In two spots of beard_thin_mm the share beard_thin of the beard is
+    missing; farther from mouth and chin than beard_dense_mm, beard_sparse of it; everywhere it is
+    uneven by beard_patchy over beard_patch_mm.
     """
 
     called: ClassVar[str] = "regions"
@@ -125,12 +127,12 @@ class Regions(Parameters):
     beard_top: tuple[tuple[float, float], ...] = _BEARD_TOP
     beard_bottom: tuple[tuple[float, float], ...] = _BEARD_BOTTOM
     line_noise_mm: tuple[float, float, float] = parameter(
-        (2.8, 3.0, 5.0), unit="mm", low=0.0, high=50.0, source="by eye"
+        (2.8, 4.5, 6.0), unit="mm", low=0.0, high=50.0, source="by eye"
     )
     line_noise_scale_mm: float = parameter(9.0, unit="mm", low=0.5, high=200.0, source="by eye")
     hairline_soft_mm: tuple[float, float] = _ramp(-5.0, 7.0)
     hairline_deg: tuple[float, float] = _degrees(60.0, 30.0)
-    beard_top_soft_mm: tuple[float, float] = _ramp(-3.0, 9.0)
+    beard_top_soft_mm: tuple[float, float] = _ramp(-5.0, 13.0)
     beard_bottom_soft_mm: tuple[float, float] = _ramp(-14.0, 14.0)
     beard_front_mm: tuple[float, float] = _ramp(2.0, 32.0)
     beard_thin: float = parameter(0.55, low=0.0, high=1.0, source="by eye")
@@ -138,6 +140,12 @@ class Regions(Parameters):
         (13.0, 11.0), unit="mm outwards and below the mouth", low=0.0, high=100.0, source="by eye"
     )
     beard_thin_mm: float = _radius(5.0)
+    beard_dense_mm: float = _radius(26.0)
+    beard_sparse: float = parameter(
+        0.55, low=0.0, high=1.0, source="share that is missing far from the mouth, by eye"
+    )
+    beard_patchy: float = parameter(0.3, low=0.0, high=1.0, source="of it, by eye")
+    beard_patch_mm: float = parameter(5.0, unit="mm", low=0.5, high=200.0, source="by eye")
     forehead_mm: tuple[float, float, float, float] = _ramp(20.0, 34.0, 66.0, 50.0)
     forehead_deg: tuple[float, float] = _degrees(55.0, 40.0)
     chest_mm: tuple[float, float] = _ramp(-170.0, -230.0)

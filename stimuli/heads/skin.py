@@ -132,6 +132,10 @@ def masks(
     out, below = regions.beard_thin_place_mm
     thin = [blob(mouth + [side * out, -below, 0.0], regions.beard_thin_mm) for side in (-1, 1)]
     beard *= 1 - regions.beard_thin * thin[0] - regions.beard_thin * thin[1]
+    # densest about mouth and chin, sparser on cheeks and neck, and nowhere even
+    around_mouth = blob(0.5 * (mouth + mark["chin"]), regions.beard_dense_mm)
+    beard *= 1 - regions.beard_sparse * (1 - around_mouth)
+    beard *= 1 + regions.beard_patchy * _wobble(p[:, [2, 0, 1]], regions.beard_patch_mm)
     beard *= (1 - hair) * off_ear
     inside = smoothstep(0.35, 0.8, own["inside-mouth"]) * (1 - smoothstep(0.05, 0.4, own["lips"]))
 

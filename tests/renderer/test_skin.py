@@ -117,3 +117,42 @@ def test_only_a_whole_skin_has_a_medium_of_its_own(material, words):
     with pytest.raises(InputError) as caught:
         scenes.read_scene({**table, "materials": {"ball": {**material, "medium": "person"}}})
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+WIDE = {"height_mm": 24.0, "size": 160}  # 0.15 mm a pixel
+
+
+def test_light_that_bounces_off_takes_uneven_skin_at_its_mean():
+    """Spots, freckles and mottling are as much pigment as `pigments` reckons with."""
+    for own in (
+        {"freckles": 0.3, "freckle_share": 1.0, "spot_share": 0.0, "uneven": (0.0, 0.0)},
+        {"freckles": 0.0, "spots": 0.3, "spot_share": 1.0, "red_share": 0.0, "uneven": (0.0, 0.0)},
+        {"freckles": 0.0, "spot_share": 1.0, "red_spots": 0.2, "red_share": 1.0},
+        {"mottling": 3.0, "freckles": 0.0, "spot_share": 0.0, "uneven": (0.0, 0.6)},
+    ):
+        values = {"moles": 0.0, "vessels": 0.0, "mottling": 0.0, **own}
+        row = np.zeros((1, len(renderer.scene.MASKS)))
+        _, albedo = shaded({**FLAT, **values}, **WIDE)
+        expected = Skin(**values).mean_albedo(row)[0]
+        np.testing.assert_allclose(albedo.mean(axis=(0, 1)), expected, rtol=0.05)
+
+
+def test_skin_is_uneven_at_every_scale_and_red_spots_are_blood():
+    """Standard deviations of the albedo's logarithm over 0.5, 1.5 and 5 mm."""
+    from scipy.ndimage import gaussian_filter
+
+    def over(scale_mm, albedo):
+        pixels = scale_mm / 0.15
+        log = np.log(albedo[..., 1])
+        return (gaussian_filter(log, pixels / 4) - gaussian_filter(log, pixels)).std()
+
+    _, uneven = shaded({**FLAT, "spot_share": 0.0, "freckles": 0.0}, **WIDE)
+    assert all(over(scale, uneven) > 0.012 for scale in (0.5, 1.5, 5.0))
+    spotted = {**FLAT, **EVEN, "spot_share": 1.0}
+    share = []  # of what red light loses, of green's
+    for red in (0.0, 1.0):
+        _, albedo = shaded({**spotted, "red_share": red}, **WIDE)
+        lost = np.log(albedo.min(axis=(0, 1)) / np.median(albedo, axis=(0, 1)))
+        assert lost[1] < np.log(0.85)
+        share.append(lost[0] / lost[1])
+    assert share[1] < 0.75 * share[0], share
