@@ -7,11 +7,12 @@ read is made anew. Each is held below LIMIT_MB: what was not used for longest go
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import os
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -71,38 +72,95 @@ def key(parts: Iterable, files: Iterable[Path], packages: tuple[str, ...]) -> st
     return sha256.hexdigest()[:32]
 
 
+def parts(value: object) -> Iterator:
+    """All that a value says, for `key`: its arrays one by one, and the repr of all else.
+
+    Dataclasses, mappings, lists and tuples are gone through, sparse matrices as their arrays.
+    """
+    if isinstance(value, np.ndarray):
+        yield value
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        yield type(value).__name__
+        for one in dataclasses.fields(value):
+            yield one.name
+            yield from parts(getattr(value, one.name))
+    elif isinstance(value, Mapping):
+        yield f"{len(value)} by name"
+        for name, one in value.items():
+            yield name
+            yield from parts(one)
+    elif isinstance(value, list | tuple):
+        yield f"{len(value)} in order"
+        for one in value:
+            yield from parts(one)
+    elif hasattr(value, "tocsr"):
+        sparse = value.tocsr()
+        yield from (sparse.shape, sparse.data, sparse.indices, sparse.indptr)
+    else:
+        yield repr(value)
+
+
+#: What reading a file that is not there or not whole raises.
+UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+
+
+def opened(name: str, key: str) -> np.lib.npyio.NpzFile | None:
+    """The file of a key in the cache `name`, whose arrays are read one by one, or None.
+
+    Reading them raises one of UNREADABLE where the file is not whole. Use it as a context manager.
+    """
+    if not limit_bytes():
+        return None
+    file = folder() / name / f"{key}.npz"
+    try:
+        stored = np.load(file, allow_pickle=False)
+        os.utime(file)
+        return stored
+    except UNREADABLE:
+        return None
+
+
+def keep(name: str, key: str, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
+    """Keep arrays that are written as they are made, so that not all are in memory at once.
+
+    A cache that cannot be written is said in a warning.
+    """
+    if not (most := limit_bytes()):
+        return
+    file = folder() / name / f"{key}.npz"
+    try:
+        _write(file, arrays)
+        _prune(file.parent, most)
+    except OSError as error:
+        warnings.warn(f"nothing is kept in {file.parent}: {error}", stacklevel=2)
+
+
 def kept(name: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     """The arrays of a key from the cache `name`, or as `make` returns them, which are then kept.
 
     A cache that cannot be written is said in a warning, and the arrays are returned all the same.
     """
-    most = limit_bytes()
-    file = folder() / name / f"{key}.npz"
-    if most:
+    if (stored := opened(name, key)) is not None:
         try:
-            with np.load(file, allow_pickle=False) as stored:
-                arrays = {one: stored[one] for one in stored.files}
-            os.utime(file)
-            return arrays
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            pass  # not there, or not whole
+            with stored:
+                return {one: stored[one] for one in stored.files}
+        except UNREADABLE:
+            pass  # not whole
     arrays = make()
-    if most and sum(array.nbytes for array in arrays.values()) <= most:
-        try:
-            _write(file, arrays)
-            _prune(file.parent, most)
-        except OSError as error:
-            warnings.warn(f"nothing is kept in {file.parent}: {error}", stacklevel=2)
+    if sum(array.nbytes for array in arrays.values()) <= limit_bytes():
+        keep(name, key, arrays.items())
     return arrays
 
 
-def _write(file: Path, arrays: Arrays) -> None:
+def _write(file: Path, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
     """The file is there whole or not at all."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(f".{file.name}.{os.getpid()}.part")
     try:
-        with part.open("wb") as stream:
-            np.savez(stream, **arrays)
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as packed:
+            for name, array in arrays:
+                with packed.open(f"{name}.npy", "w", force_zip64=True) as stream:
+                    np.lib.format.write_array(stream, np.asanyarray(array), allow_pickle=False)
         os.replace(part, file)
     finally:
         part.unlink(missing_ok=True)

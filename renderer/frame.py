@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from renderer import gl
+from renderer import gl, kept
 from renderer.gl import GL
 from renderer.memory import give_back
 from renderer.optics.transmittance import Translucency
@@ -70,11 +70,33 @@ class Frame:
             "view": view.view,
             "projection": view.projection,
         }
-        self._draw_surfaces()
-        self._draw_hair()
+        renderer.surfaces.look(view.eye)
+        self.surface = gl.Target(self.width, self.height, list(FORMATS), depth=True)
+        self._deep = False  # whether the depth buffer holds the surfaces
+        if not self._read("surfaces", self.surface):
+            renderer.light_up()
+            self._draw_surfaces()
+            self._draw_hair()
+            self._keep("surfaces", self.surface)
         gl.finish()
         gl.draw_nothing()
         give_back()
+
+    def _name(self, what: object) -> str | None:
+        """What buffers of this view are kept by; None where nothing is kept."""
+        if self.renderer.kept_as is None:
+            return None
+        size = (self.width, self.height)
+        return kept.view_key(self.renderer.kept_as, what, *self._shared.values(), size)
+
+    def _read(self, what: object, target: gl.Target) -> bool:
+        """Fill a target from the cache, if it is there."""
+        name = self._name(what)
+        return name is not None and kept.load_view(name, target)
+
+    def _keep(self, what: object, target: gl.Target) -> None:
+        if (name := self._name(what)) is not None:
+            kept.keep_view(name, target)
 
     def __enter__(self) -> Self:
         return self
@@ -84,21 +106,28 @@ class Frame:
 
     def _draw_surfaces(self) -> None:
         r = self.renderer
-        r.surfaces.look(self.view.eye)
-        self.surface = gl.Target(self.width, self.height, list(FORMATS), depth=True)
         self.surface.bind(clear=(0.0, 0.0, 0.0, 0.0), depth_test=True)
-        # depth first: the shading passes then touch each pixel once
+        self.deepen()  # depth first: the shading passes then touch each pixel once
+        GL.glColorMaski(1, True, True, True, False)  # the alpha of specular light is hair's
+        r.surfaces.draw(r.program, r.lamps, r.surroundings, self._shared)
+
+    def deepen(self) -> None:
+        """Have the depth buffer of what is seen: buffers that were kept come without."""
+        if self._deep:
+            return
+        r = self.renderer
+        self.surface.bind(depth_test=True)
         GL.glColorMask(False, False, False, False)
+        GL.glClear(GL.GL_DEPTH_BUFFER_BIT)
         depth = r.program("passes/depth.frag", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert")
         r.surfaces.draw_depth(depth, self._shared)
         gl.finish()
         GL.glColorMask(True, True, True, True)
-        GL.glColorMaski(1, True, True, True, False)  # the alpha of specular light is hair's
-        r.surfaces.draw(r.program, r.lamps, r.surroundings, self._shared)
+        self._deep = True
 
     def _draw_hair(self) -> None:
         r = self.renderer
-        if not r.hair:
+        if not r.has_hair:
             return
         depths = occlusion.blocks(self.surface.textures[3].read()[::-1, :, 0])
         sources = (r.context, r.program, r.lamps, r.surroundings, self._shared)
@@ -110,6 +139,7 @@ class Frame:
         if diffuse == "lambert":
             return self.surface.textures[0]
         if diffuse not in self._shaded:
+            self._before_drawing()
             target = gl.Target(self.width, self.height, [GL.GL_RGBA32F], depth=self.surface)
             target.bind(clear=(0.0, 0.0, 0.0, 0.0))
             target.bind(depth_test=True)  # the depth is there already
@@ -118,6 +148,11 @@ class Frame:
             self._shaded[diffuse] = target
         return self._shaded[diffuse].textures[0]
 
+    def _before_drawing(self) -> None:
+        """What surfaces are drawn once more with: lamps and the depth of what is seen."""
+        self.renderer.light_up()
+        self.deepen()
+
     def transmitted(self, translucency: Translucency) -> gl.Texture:
         """Light that comes through thin parts, to be added to the irradiance; the last is kept."""
         if translucency not in self._transmitted:
@@ -125,11 +160,14 @@ class Frame:
                 target.delete()
             self._transmitted.clear()
             target = gl.Target(self.width, self.height, [GL.GL_RGBA16F], depth=self.surface)
-            target.bind(clear=(0.0, 0.0, 0.0, 0.0))
-            target.bind(depth_test=True)  # the depth is there already
-            r = self.renderer
-            shared = (r.program, r.lamps, r.surroundings, self._shared)
-            r.surfaces.draw_transmitted(*shared, translucency)
+            if not self._read(translucency, target):
+                self._before_drawing()
+                target.bind(clear=(0.0, 0.0, 0.0, 0.0))
+                target.bind(depth_test=True)  # the depth is there already
+                r = self.renderer
+                shared = (r.program, r.lamps, r.surroundings, self._shared)
+                r.surfaces.draw_transmitted(*shared, translucency)
+                self._keep(translucency, target)
             self._transmitted[translucency] = target
         return self._transmitted[translucency].textures[0]
 
@@ -203,8 +241,9 @@ class Frame:
                 partial(r.placed, diffuse=diffuse, translucency=translucency),
                 r.surfaces.points,
                 self._shared,
-                self.surface,
-                r.lamps,
+                self._seen,
+                lambda: r.lamps,
+                r.lights,
                 r.media[medium - 1] if r.media else None,
                 r.surroundings,
                 (*r.surfaces.surfaces, *r.surfaces.eyes),
@@ -213,6 +252,11 @@ class Frame:
             self.height,
             r.executor,
         )
+
+    def _seen(self) -> gl.Target:
+        """The target whose depth buffer holds what is seen."""
+        self.deepen()
+        return self.surface
 
     def pieces(self, technique: Technique) -> list[Piece]:
         """The pieces in which a technique's picture is drawn."""
@@ -310,7 +354,7 @@ class Frame:
         linear = self.lens is not None
         r, bare, dimmed = self.renderer, None, None
         if technique.specular_white is not None:
-            bare = self._bare_specular() if r.hair else None
+            bare = self._bare_specular() if r.has_hair else None
             specular = bare.textures[1] if bare else self.surface.textures[1]
             dimmed = (specular, technique.specular_white * self._strongest())
         pixels = composite(
@@ -334,6 +378,7 @@ class Frame:
 
     def _bare_specular(self) -> gl.Target:
         """Surfaces once more: textures[1] is specular light without hair. The caller frees it."""
+        self._before_drawing()
         target = gl.Target(self.width, self.height, [GL.GL_RGBA16F] * 2, depth=self.surface)
         target.bind(clear=(0.0, 0.0, 0.0, 0.0))
         target.bind(depth_test=True)  # the depth is there already
@@ -346,7 +391,7 @@ class Frame:
         a sphere where there is no lamp.
         """
         shining = [0.0]
-        for light in self.renderer.lamps.lights:
+        for light in self.renderer.lights:
             falloff = 1.0
             if isinstance(light, PointLight):
                 falloff = light.falloff(np.linalg.norm(self.renderer.subject - light.place))

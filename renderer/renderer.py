@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 import pyrender
 
-from renderer import VERSION, gl
+from renderer import VERSION, gl, kept
 from renderer.errors import InputError
 from renderer.frame import Frame
 from renderer.memory import give_back, give_back_large
@@ -21,6 +22,7 @@ from renderer.passes.points import Points
 from renderer.passes.surfaces import PLACED_FORMATS, Drawn, Surfaces
 from renderer.scene import graph as graphs
 from renderer.scene.camera import Camera
+from renderer.scene.lights import Light
 from renderer.scene.picture import Picture
 from renderer.scene.view import main_camera, resolve
 
@@ -43,7 +45,8 @@ class Renderer:
     scene: a renderer.scene.graph.SceneGraph, or any pyrender.Scene. size: (width, height) of the
     images; supersample: 1 to 4 samples a pixel along each side; seed: of the solid noise and of
     the baked light; rays: of the bake, per vertex; shadow_map: pixels of a lamp's map; executor:
-    walks for the technique `reference`, without it this process does.
+    walks for the technique `reference`, without it this process does; keep: whether shadow maps and
+    frames' buffers are kept in the caches `shadows` and `views`, and read from there.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class Renderer:
         rays: int = 144,
         shadow_map: int = SHADOW_MAP,
         executor: Executor | None = None,
+        keep: bool = False,
     ):
         width, height = size
         if min(width, height) < 16 or max(width, height) * supersample > SIZE_LIMIT:
@@ -68,7 +72,7 @@ class Renderer:
         if not contents.surfaces:
             raise InputError("the scene has no surface; expected at least one mesh")
         self.scene, self.size, self.supersample, self.seed = scene, size, supersample, seed
-        self.executor = executor
+        self.executor, self._shadow_map, self._contents = executor, shadow_map, contents
         give_back_large()
         give_back()  # what the making of the scene has freed
         self.context = gl.Context()
@@ -76,25 +80,71 @@ class Renderer:
             self._programs: dict = {}
             self.surroundings = Surroundings(contents.environment)
             self.surfaces = Surfaces(contents, contents.lights, self.surroundings, rays, seed)
-            base: dict[int, Drawn] = {}  # a mesh's first surface is what its hair stands on
-            for drawn in self.surfaces.surfaces:
-                base.setdefault(drawn.item.mesh, drawn)
-            self.hair = [Hair(item, base[item.mesh]) for item in contents.strands]
-            points = [self.surfaces.vertices(), *(hair.points for hair in self.hair)]
-            everything = np.vstack(points)
-            casting = [hair.casting(LEAST_MM) for hair in self.hair]
-            strands = np.vstack([np.empty((0, 3)), *casting])
-            self.lamps = Lamps(contents.lights, everything, strands, shadow_map)
-            self.lamps.draw(self.program, self.surfaces, self.hair)
-            for hair in self.hair:
-                hair.light(self.context, self.program, self.lamps, self.surroundings)
+            self.kept_as = self._key(rays) if keep else None
+            if not keep:
+                self.light_up()
         except BaseException:
             self.close()
             raise
         give_back()
-        subject = getattr(scene, "subject", None)
-        middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
-        self.subject = middle if subject is None else np.asarray(subject, float)
+
+    def _key(self, rays: int) -> str:
+        """What shadow maps are kept by, and frames' buffers with their camera."""
+        drawn = [*self.surfaces.surfaces, *self.surfaces.eyes]
+        told = (self.info(), self.seed, rays, self._shadow_map)
+        return kept.scene_key(self._contents, drawn, self.surroundings.content(), *told)
+
+    @cached_property
+    def hair(self) -> list[Hair]:
+        """The strands of each mesh that has some."""
+        base: dict[int, Drawn] = {}  # a mesh's first surface is what its hair stands on
+        for drawn in self.surfaces.surfaces:
+            base.setdefault(drawn.item.mesh, drawn)
+        return [Hair(item, base[item.mesh]) for item in self._contents.strands]
+
+    @property
+    def has_hair(self) -> bool:
+        """Whether anything in the scene has strands."""
+        return bool(self._contents.strands)
+
+    @cached_property
+    def _everything(self) -> np.ndarray:
+        """All points (N, 3) of the scene, mm."""
+        return np.vstack([self.surfaces.vertices(), *(hair.points for hair in self.hair)])
+
+    @cached_property
+    def subject(self) -> np.ndarray:
+        """What cameras look at (3,), mm: the scene's own, or the middle of all."""
+        own = getattr(self.scene, "subject", None)
+        if own is not None:
+            return np.asarray(own, float)
+        return 0.5 * (self._everything.min(axis=0) + self._everything.max(axis=0))
+
+    @cached_property
+    def lamps(self) -> Lamps:
+        """The lamps with their maps, which are drawn when they are first asked for, or read where
+        they are kept: ask before a target is bound, by `light_up`.
+        """
+        strands = np.vstack([np.empty((0, 3)), *(hair.casting(LEAST_MM) for hair in self.hair)])
+        lamps = Lamps(self._contents.lights, self._everything, strands, self._shadow_map)
+        if self.kept_as and kept.load_shadows(self.kept_as, lamps, self.hair):
+            return lamps
+        lamps.draw(self.program, self.surfaces, self.hair)
+        for hair in self.hair:
+            hair.light(self.context, self.program, lamps, self.surroundings)
+        if self.kept_as:
+            kept.keep_shadows(self.kept_as, lamps, self.hair)
+        return lamps
+
+    def light_up(self) -> None:
+        """Have the lamps' maps drawn or read, with another target than what is bound."""
+        _ = self.lamps
+        give_back()
+
+    @property
+    def lights(self) -> list[Light]:
+        """The scene's lamps as values."""
+        return self._contents.lights
 
     def __enter__(self) -> Self:
         return self
@@ -168,6 +218,7 @@ class Renderer:
         the subject's front.
         """
         self.context.make_current()
+        self.light_up()
         target = gl.Target(*size, list(PLACED_FORMATS), depth=domain == "ATLAS")
         target.bind(clear=(0.0, 0.0, 0.0, 0.0))
         shared = {

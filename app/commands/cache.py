@@ -15,6 +15,8 @@ def caches() -> dict[str, tuple[Path, str]]:
         "heads": (folder(), "base data of generated people, fetched again when needed"),
         "people": (folder() / "people", "generated people as arrays; made again"),
         "light": (folder() / "light", "light baked on scenes; baked again"),
+        "shadows": (folder() / "shadows", "shadow maps of scenes; drawn again"),
+        "views": (folder() / "views", "what all techniques share in a view; drawn again"),
         "skin": (folder() / "skin", "colours of skin by its pigments; reckoned again"),
         "montecarlo": (
             cache_folder(),
@@ -48,7 +50,19 @@ def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
 @click.option(
     "--clear",
     metavar="NAME",
-    type=click.Choice(["heads", "people", "light", "skin", "montecarlo", "reference", "converged"]),
+    type=click.Choice(
+        [
+            "heads",
+            "people",
+            "light",
+            "shadows",
+            "views",
+            "skin",
+            "montecarlo",
+            "reference",
+            "converged",
+        ]
+    ),
     help="Remove this cache by its name. Nothing in it is lost for good.",
 )
 def command(clear: str | None) -> None:

@@ -150,6 +150,7 @@ def command(
             supersample=supersample,
             seed=seed,
             executor=crew.executor,
+            keep=True,
         ) as drawing,
         drawing.frame() as frame,
     ):

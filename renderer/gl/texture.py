@@ -19,6 +19,13 @@ _FORMATS = {  # internal format -> (format, channels, bytes a texel)
     GL.GL_RGBA8: (GL.GL_RGBA, 4, 4),
     GL.GL_DEPTH_COMPONENT16: (GL.GL_DEPTH_COMPONENT, 1, 2),
 }
+_TYPES = {  # internal format -> how OpenGL hands out its own bits, and numpy's type of them
+    GL.GL_RGBA32F: (GL.GL_FLOAT, np.float32),
+    GL.GL_RGBA16F: (GL.GL_HALF_FLOAT, np.float16),
+    GL.GL_RG16F: (GL.GL_HALF_FLOAT, np.float16),
+    GL.GL_R32F: (GL.GL_FLOAT, np.float32),
+    GL.GL_DEPTH_COMPONENT16: (GL.GL_UNSIGNED_SHORT, np.uint16),
+}
 _DEPTH, _DEPTH_BYTES = GL.GL_DEPTH_COMPONENT32F, 4  # of a target's own depth buffer
 BLENDS = ("over", "add")
 
@@ -103,6 +110,17 @@ class Texture:
         GL.glGetTexImage(self.kind, 0, form, GL.GL_FLOAT, out)
         return out[::-1]
 
+    def write_rows(self, first: int, texels: np.ndarray) -> None:
+        """Fill rows from `first` on, 0 below, with texels (rows, width, channels) of the texture's
+        own type, as `Target.read_rows` gives them.
+        """
+        form, (number, kind) = _FORMATS[self.internal][0], _TYPES[self.internal]
+        texels = np.ascontiguousarray(texels, kind)
+        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+        GL.glBindTexture(self.kind, self.id)
+        place = (0, first, self.width, len(texels))
+        GL.glTexSubImage2D(self.kind, 0, *place, form, number, texels)
+
     def delete(self) -> None:
         free(self._handle)
 
@@ -129,6 +147,26 @@ class TextureArray(Texture):
         """Fill a layer with what was drawn into the bound target, of the same size."""
         GL.glBindTexture(self.kind, self.id)
         GL.glCopyTexSubImage3D(self.kind, 0, 0, 0, layer, 0, 0, self.width, self.height)
+
+    def bits(self) -> np.ndarray:
+        """The texels (layers, height, width, channels) in the texture's own type, row 0 below."""
+        (form, channels, _), (number, kind) = _FORMATS[self.internal], _TYPES[self.internal]
+        GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
+        GL.glBindTexture(self.kind, self.id)
+        out = np.empty((self.layers, self.height, self.width, channels), kind)
+        GL.glGetTexImage(self.kind, 0, form, number, out)
+        return out
+
+    def set_bits(self, texels: np.ndarray) -> None:
+        """Fill the texture with what `bits` gave. Raises ValueError for another shape or type."""
+        (form, channels, _), (number, kind) = _FORMATS[self.internal], _TYPES[self.internal]
+        shape = (self.layers, self.height, self.width, channels)
+        if texels.shape != shape or texels.dtype != kind:
+            raise ValueError(f"texels are {texels.shape} {texels.dtype}; expected {shape} {kind}")
+        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+        GL.glBindTexture(self.kind, self.id)
+        size = (self.width, self.height, self.layers)
+        GL.glTexSubImage3D(self.kind, 0, 0, 0, 0, *size, form, number, np.ascontiguousarray(texels))
 
     def read(self) -> np.ndarray:
         """The texels: (layers, height, width, channels) float32, row 0 at the top."""
@@ -238,6 +276,19 @@ class Target:
             GL.glClearDepth(1.0)
             depth = GL.GL_DEPTH_BUFFER_BIT if depth_test and blend is None else 0
             GL.glClear(GL.GL_COLOR_BUFFER_BIT | depth)
+
+    def read_rows(self, place: int, low: int, high: int) -> np.ndarray:
+        """Rows low to high, 0 below, of one of the textures, in its own type: (rows, width,
+        channels).
+        """
+        internal = self.textures[place].internal
+        (form, channels, _), (number, kind) = _FORMATS[internal], _TYPES[internal]
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.id)
+        GL.glReadBuffer(GL.GL_COLOR_ATTACHMENT0 + place)
+        GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
+        out = np.empty((high - low, self.width, channels), kind)
+        GL.glReadPixels(0, low, self.width, high - low, form, number, out)
+        return out
 
     def delete(self) -> None:
         for texture in self.textures:

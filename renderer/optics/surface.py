@@ -6,8 +6,11 @@ Kelemen and Szirmay-Kalos 2001's specular model over Beckmann's slopes; Burley 2
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
+
+from renderer import caches
 
 #: How light passes the face on its way to the medium and back. "lambert": all of it. "disney":
 #: Burley 2012, "Physically-based shading at Disney", sec. 5.3, with its retro-reflection.
@@ -78,8 +81,13 @@ def table() -> np.ndarray:
     """(TABLE, TABLE + 1, 4) float32: a row a roughness of ROUGHNESS, a column a cosine of [0, 1].
 
     x, y: `specular_albedo`; z: `disney_albedo`. The last column has the means over all directions,
-    weighted by the cosine: of even light.
+    weighted by the cosine: of even light. Kept in the cache `skin`.
     """
+    key = caches.key(["face"], [Path(__file__)], ("numpy",))
+    return caches.kept("skin", key, lambda: {"table": _table()})["table"]
+
+
+def _table() -> np.ndarray:
     cosine = (np.arange(TABLE) + 0.5) / TABLE
     roughness = np.linspace(*ROUGHNESS, TABLE)
     out = np.ones((TABLE, TABLE + 1, 4), np.float32)

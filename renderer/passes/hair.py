@@ -117,6 +117,17 @@ class Hair:
                 self._lit.copy_layer(k)
         lift.delete()
 
+    def lit(self) -> np.ndarray:
+        """What `light` found, to be kept: (lamps, rows, COLUMNS, 2) float16."""
+        if self._lit is None:
+            raise RuntimeError("hair is not lit yet; expected light() before lit()")
+        return self._lit.bits()
+
+    def set_lit(self, kept: np.ndarray) -> None:
+        """Take what `lit` gave in `light`'s stead."""
+        self._lit = gl.TextureArray(COLUMNS, self.rows, len(kept), GL.GL_RG16F)
+        self._lit.set_bits(kept)
+
     def casting(self, least_mm: float) -> np.ndarray:
         """Points (M, 3) of the strands that are at least so wide."""
         return self.points[(self.size * self.strands.width_mm >= least_mm)[self.of]]

@@ -149,6 +149,10 @@ class Lamps:
                     own.draw_shadows(sums, values, LEAST_MM)
                 self.sums.copy_layer(index)
 
+    def maps(self) -> dict[str, gl.TextureArray]:
+        """What `draw` fills."""
+        return {"solid": self.solid.array, "strands": self.strands.array, "sums": self.sums}
+
     def defines(self) -> dict[str, int]:
         """Sizes of the shaders' arrays."""
         return {

@@ -130,7 +130,7 @@ class AtlasTechnique(Technique):
 
     def scatter(self, inputs: Inputs) -> Scattered:
         room = inputs.needed_room(self.name)
-        with result(inputs, room.depth) as target:
+        with result(inputs, room.depth()) as target:
             target.bind()
             inputs.programs(START).use(light=inputs.irradiance, unblurred=np.ones(3), samples=0.0)
             gl.draw_fullscreen(inputs.context)

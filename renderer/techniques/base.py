@@ -15,13 +15,14 @@ from renderer.optics.transmittance import EXPONENTS, MODELS, THICKNESS, Transluc
 from renderer.parameters import Parameters, parameter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from renderer import gl
     from renderer.passes.environment import Surroundings
     from renderer.passes.lamps import Lamps
     from renderer.passes.points import Points
     from renderer.passes.surfaces import Drawn
+    from renderer.scene.lights import Light
 
 
 @dataclass(frozen=True)
@@ -71,9 +72,10 @@ class Room:
     surfaces: those of the medium at hand; medium: its id; value: what the scene names it.
     placed(drawn, domain, size, points, point_mm): a surface's light over "ATLAS" or "POINTS", see
     Renderer.placed. points(drawn, faces, weights): points on it. camera: the uniforms
-    camera_position, view and projection; depth: the target whose depth buffer holds what is seen;
-    lamps: with the layers of their maps; surroundings: the environment; bodies: all surfaces and
-    eyes of the scene.
+    camera_position, view and projection; depth(): the target whose depth buffer holds what is seen;
+    lamps(): with the layers of their maps; both are drawn when they are first asked for, which has
+    to be before a target is bound; lights: the lamps as values; surroundings: the environment;
+    bodies: all surfaces and eyes of the scene.
     """
 
     surfaces: tuple[Drawn, ...]
@@ -81,8 +83,9 @@ class Room:
     placed: Callable[..., gl.Target]
     points: Callable[..., Points]
     camera: dict[str, Any]
-    depth: gl.Target
-    lamps: Lamps
+    depth: Callable[[], gl.Target]
+    lamps: Callable[[], Lamps]
+    lights: Sequence[Light]
     value: str | dict | None
     surroundings: Surroundings
     bodies: tuple[Drawn, ...]

@@ -115,7 +115,7 @@ class DeonLuebke(AtlasGaussians):
     @contextmanager
     def _ways_through(self, atlas: Atlas) -> Iterator[tuple[gl.Texture, gl.Texture | None]]:
         """exp(-falloff thickness) and where light enters, over the atlas; None: no way through."""
-        lamps = atlas.room.lamps
+        lamps = atlas.room.lamps()
         if not (self.translucency == "maps" and lamps.layers):
             yield atlas.light, None
             return

@@ -210,7 +210,7 @@ class PointsTechnique(Technique):
         if self.samples == "surface":
             yield body.over_surface(*over), "all"
             return
-        for k, light in enumerate(room.lamps.lights):
+        for k, light in enumerate(room.lights):
             options = (self.weights == "published", self.depth_along_light, self.name)
             seen = body.from_lamp(light, self.spacing_mm, self.grid, self.jitter, *options)
             if seen is not None:
@@ -224,7 +224,7 @@ class PointsTechnique(Technique):
     def _one(self, inputs: Inputs, room: Room, parts: tuple[Drawn, ...], sums: gl.Target) -> None:
         """Add one body's points to the sums."""
         body = Body(parts, self.seed)
-        with gl.Target(inputs.width, inputs.height, [GL.GL_RGBA16F], depth=room.depth) as seen:
+        with gl.Target(inputs.width, inputs.height, [GL.GL_RGBA16F], depth=room.depth()) as seen:
             seen.bind(clear=(0.0, 0.0, 0.0, 0.0))
             seen.bind(depth_test=True)
             GL.glDepthMask(False)

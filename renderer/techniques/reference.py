@@ -162,7 +162,7 @@ class Reference(Technique):
         parts = [part_of(drawn) for drawn in room.surfaces]
         own = {id(drawn) for drawn in room.surfaces}
         others = [part_of(drawn) for drawn in room.bodies if id(drawn) not in own]
-        scene = traced.World.of(parts, others, room.lamps.lights, room.surroundings.radiance, tint)
+        scene = traced.World.of(parts, others, room.lights, room.surroundings.radiance, tint)
         eye = traced.Eye.of(room.camera, where, inputs.pixels_per_mm, scene)
         photons = self.walks // 2 * int(where.sum())
         return traced.trace(scene, medium, eye, photons, self.seed)

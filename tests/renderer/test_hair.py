@@ -24,7 +24,7 @@ def stand_of(points, width_mm, back_mm=-200.0):
     surface = Surface(
         corners.astype(np.float32),
         normals.astype(np.float32),
-        np.zeros((4, 2), np.float32),
+        (0.5 + corners[:, :2] / 500).astype(np.float32),
         faces.astype(np.uint32),
         np.zeros((4, len(MASKS)), np.float32),
         Proxy.itself(corners, normals, faces, (0.5, 0.5, 0.5)),
