@@ -13,6 +13,7 @@ import uuid
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -79,26 +80,42 @@ def walked(
     if executor is None:
         yield from (walk_block(start, solid, block) for block in wanted)
         return
+    waiting: deque = deque()
+    with handed_on(start, folder) as file:
+        try:
+            for block in wanted:
+                waiting.append(executor.submit(walk_there, file, block))
+                if len(waiting) == AHEAD:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()
+
+
+@contextmanager
+def handed_on(start: Start, folder: Path) -> Iterator[Path]:
+    """The path of a file in a folder from which other processes read a start."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f".walks-{uuid.uuid4().hex}.pickle"
-    waiting: deque = deque()
     try:
         file.write_bytes(pickle.dumps(start))
-        for block in wanted:
-            waiting.append(executor.submit(walk_there, file, block))
-            if len(waiting) == AHEAD:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+        yield file
     finally:
-        for future in waiting:
-            future.cancel()
         file.unlink(missing_ok=True)
 
 
 def walk_there(file: Path, block: Block) -> list[Walks]:
     """`walk_block` in another process."""
     return walk_block(*_read(file), block)
+
+
+def walk_in(file: Path, channel: int, *photons: np.ndarray) -> Walks:
+    """`walk` in another process, from photons: points, normals, index, directions inside."""
+    start, solid = _read(file)
+    points, normals, index, inside = photons
+    return walk(solid, start.medium, channel, points, normals, index, [start.seed], inside)
 
 
 @lru_cache(maxsize=1)

@@ -11,20 +11,26 @@ face itself mirrors is left out: highlights are drawn with the picture.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from renderer import caches
 from renderer.optics import fresnel
 from renderer.passes.bake import frames, seen
+from renderer.reference.blocks import Start, handed_on, walk_in
 from renderer.reference.estimate import Halves, Walked, accumulate
-from renderer.reference.walk import FAR, INWARD_MM, Part, Solid, walk
+from renderer.reference.walk import FAR, INWARD_MM, Part, Solid, Walks, walk
 from renderer.scene.lights import DistantLight, Light
 from renderer.scene.shapes import points_on
 
 BLOCK = 60_000  # photons of a channel that are on their way together
+PART = 10_000  # of them that are walked as one task
 OFF_MM = 1e-3  # off the face, where a ray outside of it starts
 #: What of a lamp's photons is spread evenly: triangles that their middles say are dark.
 EVEN = 0.02
@@ -163,13 +169,25 @@ class Photons:
     flux: np.ndarray
 
 
+#: Photons that are to be walked: points, normals, index, directions inside; see `walk`.
+Asked = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
 def trace(
-    scene: World, medium: Walked, eye: Eye, photons: int, seed: int, keep: bool = True
+    scene: World,
+    medium: Walked,
+    eye: Eye,
+    photons: int,
+    seed: int,
+    keep: bool = True,
+    executor: Executor | None = None,
 ) -> Halves:
     """Scattered irradiance at an eye's pixels, by so many photons a channel in each half.
 
     As `estimate` gives it: even diffuse light on a flat half-space stays as it is. What takes
     longer than SAVE_EVERY_S is kept in the cache while it runs (`keep`), and taken up from there.
+    executor: walks, in processes that see the cache, while this one sends light out and counts what
+    arrives; the same to the bit.
     """
     eta, channels = float(medium.medium.eta), medium.medium.channels
     passed = 1 - fresnel.diffuse_reflectance(1 / eta) if eta != 1 else 1.0
@@ -179,18 +197,67 @@ def trace(
     sums = np.zeros((2, count, channels))
 
     def add(done: int, block: int) -> None:
+        under_way: deque = deque()  # blocks that are walked side by side, and go on in turn
+
+        def go_on(half: int, c: int, walking: Generator, left: Walks | None) -> None:
+            try:
+                waiting = _submitted(submit, c, walking.send(left))
+                under_way.append((half, c, walking, waiting))
+            except StopIteration as ended:
+                sums[half, :, c] += block * ended.value
+
         for half in (0, 1):
             for c in range(channels):
                 rng = np.random.default_rng([seed, done, half, c])
-                found = _block(scene, medium, eye, importance, c, block, rng, unit[c])
-                sums[half, :, c] += block * found
+                walking = _block(scene, medium, eye, importance, c, block, rng, unit[c])
+                go_on(half, c, walking, None)
+        while under_way:
+            half, c, walking, waiting = under_way.popleft()
+            go_on(half, c, walking, _together(waiting))
 
     def halves(done: int) -> Halves:
         return Halves(sums / done, np.ones_like(sums), done)
 
     name = f"{_key(scene, medium, eye, seed)}-{photons}" if keep else None
-    accumulate(name, sums, photons, BLOCK, add, halves, "photon")
+    with _walking(scene.solid, medium, executor) as submit:
+        accumulate(name, sums, photons, BLOCK, add, halves, "photon")
     return Halves(sums / photons, np.ones_like(sums), photons // max(count, 1))
+
+
+@contextmanager
+def _walking(
+    solid: Solid, medium: Walked, executor: Executor | None
+) -> Iterator[Callable[..., Future]]:
+    """submit(channel, *photons) -> a future of their walks; by this process without an executor."""
+    if executor is None:
+
+        def here(channel: int, points, normals, index, inside) -> Future:
+            done: Future = Future()
+            photons = (points, normals, index, [0], inside)
+            done.set_result(walk(solid, medium.medium, channel, *photons))
+            return done
+
+        yield here
+        return
+    none = np.empty((0, 3))
+    start = Start(solid.parts, medium.medium, none, none, np.empty(0, int), 0)
+    with handed_on(start, caches.folder() / "reference") as file:
+        yield lambda channel, *photons: executor.submit(walk_in, file, channel, *photons)
+
+
+def _submitted(submit: Callable[..., Future], channel: int, asked: Asked) -> list[Future]:
+    """Photons given away in parts of PART, which are the same whoever walks them."""
+    begins = range(0, len(asked[0]), PART)
+    return [submit(channel, *(array[at : at + PART] for array in asked)) for at in begins]
+
+
+def _together(waiting: list[Future]) -> Walks:
+    """The walks of all parts of PART photons."""
+    done = [future.result() for future in waiting]
+    source = [PART * k + walks.source for k, walks in enumerate(done)]
+    rest = ("triangle", "weights", "carried", "directions")
+    joined = (np.concatenate([getattr(walks, name) for walks in done]) for name in rest)
+    return Walks(np.concatenate(source), *joined)
 
 
 def _block(
@@ -202,8 +269,10 @@ def _block(
     count: int,
     rng: np.random.Generator,
     unit: float,
-) -> np.ndarray:
-    """What a block of photons brings each pixel, (N,)."""
+) -> Generator[Asked, Walks, np.ndarray]:
+    """Asks for photons to be walked, is sent where they left, and returns what a block of them
+    brings each pixel, (N,).
+    """
     solid, eta = scene.solid, float(medium.medium.eta)
     total = np.zeros(int((eye.number >= 0).sum()))
     light = _join(list(_emitted(scene, importance, channel, count, rng)))
@@ -215,7 +284,7 @@ def _block(
         flux, inside = refracted(light.directions, normals, eta)
         flux = flux * light.flux
         index = rng.integers(0, 2**63, len(flux), dtype=np.uint64)
-        left = walk(solid, medium.medium, channel, light.points, normals, index, [0], inside)
+        left = yield light.points, normals, index, inside
         flux = flux[left.source] * left.carried
         points = np.einsum("kc,kca->ka", left.weights, solid.corners[left.triangle])
         points, normals = points + solid.middle, solid.normals[left.triangle]
@@ -350,12 +419,12 @@ def _key(scene: World, medium: Walked, eye: Eye, seed: int) -> str:
     channels = range(medium.medium.channels)
     tints = np.stack([scene.tint(triangles, thirds, c) for c in channels])
     digest = hashlib.sha256()
-    for name in ("walk.py", "estimate.py", "traced.py"):
+    for name in ("walk.py", "blocks.py", "estimate.py", "traced.py"):
         digest.update(Path(__file__).with_name(name).read_bytes())
     own = (scene.everything.corners, scene.everything.middle, scene.radiance(towards), tints)
     for array in (*own, eye.position, eye.turn, eye.lens, eye.number):
         digest.update(np.ascontiguousarray(array).tobytes())
     lights = [(type(light).__name__, light.plain()) for light in scene.lights]
     shape = len(scene.solid.normals)
-    digest.update(repr((medium.medium, lights, shape, seed, BLOCK, INWARD_MM)).encode())
+    digest.update(repr((medium.medium, lights, shape, seed, BLOCK, PART, INWARD_MM)).encode())
     return digest.hexdigest()[:32]

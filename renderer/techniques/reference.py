@@ -147,11 +147,6 @@ class Reference(Technique):
         """By light that is traced from where it comes from."""
         from renderer.reference import traced
 
-        if inputs.executor is not None:
-            raise InputError(
-                "reference.light is 'traced' with workers; expected 'given', or no workers: light "
-                "is traced by one process"
-            )
         room = inputs.needed_room(self.name)
         point_mm = float(np.ptp(solid.corners)) / 1000
 
@@ -165,7 +160,8 @@ class Reference(Technique):
         scene = traced.World.of(parts, others, room.lights, room.surroundings.radiance, tint)
         eye = traced.Eye.of(room.camera, where, inputs.pixels_per_mm, scene)
         photons = self.walks // 2 * int(where.sum())
-        return traced.trace(scene, medium, eye, photons, self.seed)
+        walks = {"executor": inputs.executor}
+        return traced.trace(scene, medium, eye, photons, self.seed, **walks)
 
     def _light(
         self, room: Room, solid: Solid, triangles: np.ndarray, weights: np.ndarray, point_mm: float

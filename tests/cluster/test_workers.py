@@ -22,9 +22,12 @@ from analysis.worth.resampled import FITTED
 from app.workers import MOST_LOSSES, THREADS, crew
 from renderer.optics import montecarlo
 from renderer.reference import estimate as estimates
+from renderer.reference import traced
 from renderer.reference.walk import Part, Solid
 from renderer.scene.shapes import slab
 from tests.cluster.tasks import die, die_once, threads
+from tests.renderer.test_traced import CAMERA, MATCHED, PIXELS
+from tests.renderer.test_traced import slab as traced_slab
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Writes a file in each of two processes for ever; Ctrl-C ends it.
@@ -128,6 +131,18 @@ def test_photons_by_two_processes_are_those_of_threads(two):
     alone = montecarlo.simulate(layers, 60_001, 3, cache=False, threads=1)
     shared = montecarlo.simulate(layers, 60_001, 3, cache=False, executor=two)
     assert shared.tally.sums.tobytes() == alone.tally.sums.tobytes()
+
+
+def test_light_traced_by_two_processes_is_that_of_one(two, tmp_path, monkeypatch):
+    """To the bit, of light that enters more than once; what was handed on is gone afterwards."""
+    monkeypatch.setenv("SUBDERMAL_CACHE", str(tmp_path))
+    monkeypatch.setattr(traced, "PART", 700)  # a block is several tasks
+    world, made = traced_slab((0.0, 0.6, 0.8), radiance=0.1), estimates.walked(MATCHED)
+    eye = traced.Eye.of(CAMERA, np.ones((PIXELS, PIXELS), bool), 1000.0, world)
+    alone = traced.trace(world, made, eye, 3000, 3, keep=False)
+    shared = traced.trace(world, made, eye, 3000, 3, keep=False, executor=two)
+    assert alone.values.mean() > 0.5 and shared.values.tobytes() == alone.values.tobytes()
+    assert not list((tmp_path / "reference").iterdir())
 
 
 def test_power_by_two_processes_is_that_of_one(two):
