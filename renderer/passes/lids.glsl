@@ -30,3 +30,6 @@ vec2 on_lid(vec3 local) {
 // The share of light that comes through skin from behind: a lid holds a plate of dense tissue, the tarsus, 8 to 10 mm high in the upper one.
 uniform float tarsus;
 float through_lid(vec3 local) { return 1.0 - tarsus * (1.0 - smoothstep(3.0, 6.0, on_lid(local).x)); }
+// And through a lip, of whose mask 0.5 is the border and 1 the seam: it is muscle below a thin vermilion.
+uniform float lip_muscle;
+float through_lip(float mask) { return 1.0 - lip_muscle * smoothstep(0.45, 0.75, mask); }

@@ -23,8 +23,9 @@ uniform sampler2D skin_table;        // log albedo: columns blood, rows melanin,
 uniform vec2 skin_most; uniform float skin_thinnest; uniform float skin_blocks;
 uniform float melanin; uniform float blood; uniform float flush; uniform float mottling; uniform vec2 uneven;
 uniform float eyelid_blood; uniform float eyelid_epidermis; uniform vec2 lip_blood; uniform float lip_melanin; uniform float lip_epidermis;
+uniform float lip_haze; uniform vec3 lip_haze_colour; uniform float lip_ragged;
 uniform float freckles; uniform float freckle_share; uniform float spots; uniform float spot_share; uniform vec2 spots_mm; uniform float red_spots; uniform float red_share; uniform float moles; uniform float mole_share; uniform float vessels; uniform float veins;
-uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 shaven_left; uniform vec3 inside_colour;
+uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 shaven_left; uniform vec3 inside_left;
 uniform float pore_darkness; uniform vec2 micro_mm; uniform vec3 bumps_mm;
 uniform float f0_oily; uniform float roughness_lips; uniform float lobe_share_oily; uniform float oil_patches;
 uniform float pore_depth; uniform float furrow_depth; uniform float bump_height; uniform float wrinkle_depth; uniform float lip_folds;
@@ -65,6 +66,12 @@ Spot spot(vec3 p) {
 }
 
 float lip_of(float mask) { return smoothstep(0.0, 0.6, mask); }         // how much of lip there is, 0.5 in the mask being its border
+// The mask of the lips with the ragged border that vermilion has against the skin.
+float lip_mask(vec3 q) {
+    if (a.x <= 0.0 || lip_ragged <= 0.0) return a.x;
+    float wander = 0.7 * noise(q / 2.3 + 13.0) + 0.7 * noise(q / 0.9 + 29.0);
+    return clamp(a.x + lip_ragged * wander * smoothstep(0.0, 0.3, a.x) * smoothstep(0.95, 0.6, a.x), 0.0, 1.0);
+}
 float seam_of(float mask) { return clamp(2.0 * mask - 1.0, 0.0, 1.0); }  // how near the seam
 
 // Furrows between cells of 0.62 mm that are squashed along an axis, so that most run across it. Real ones follow the skin's tension.
@@ -86,7 +93,7 @@ Waves waves_at(vec3 q) {
 
 // Pores, furrows, bumps and wrinkles at p: height in mm and its gradient.
 Relief relief(vec3 p, float pixel_mm, Waves waves) {
-    float lips = lip_of(a.x), eyelid = a.w, pores = b.x, inside = b.w;
+    float lips = lip_of(lip_mask(p + noise_origin)), eyelid = a.w, pores = b.x, inside = b.w;
     vec3 q = p + noise_origin;
     Relief r; r.h = vec4(0.0); r.fine = vec3(0.0); r.pore = 0.0; r.lost = 0.0;
     float skin = (1.0 - lips) * (1.0 - inside);
@@ -173,20 +180,26 @@ Relief relief(vec3 p, float pixel_mm, Waves waves) {
             h.z -= wrinkle_depth * 0.02 * bag * sin(s * wave) * wave * 0.5;
         }
     }
-    // lips: upright folds that fan out, some deep and most faint
+    // lips: upright grooves that fan out, wide and narrow ones, of depths of their own that come and go; and the small plates between
     if (lips > 0.01) {
         vec2 d = vec2(p.x - mouth.x, (p.y - mouth.y) * 0.35);
-        float s = d.x * (1.0 + 0.10 * noise(q / 6.0)) + 0.55 * noise(q / vec3(1.8, 6.0, 1.8)) + 0.9 * noise(q / vec3(4.5, 9.0, 4.5));
-        float wave = 2.0 * PI / 0.95, g = 0.5 + 0.5 * cos(s * wave);
-        float own = 0.55 + 0.75 * noise(vec3(floor(s / 0.95) * 3.7, q.y / 9.0, 2.0)), held = fade(0.6, pixel_mm);
-        float amp = lip_folds * 0.050 * lips * max(own, 0.1) * held;
-        h.x -= amp * pow(g, 4.0);
-        h.y += amp * 4.0 * g * g * g * 0.5 * sin(s * wave) * wave;
-        float steep = lip_folds * 0.050 * lips * wave;
-        lose(r, 0.10 * steep * steep, held);
-        Spot c = spot(q / 0.8 + 11.0);
-        float dome = exp(-c.f1 * c.f1 / 0.09);
-        h.yzw -= lip_folds * 0.010 * fade(0.6, pixel_mm) * lips * dome / 0.09 * 2.0 * c.d1 / 0.8;
+        float bend = 0.10 * d.x * noise(q / 6.0) + 0.75 * noise(q / vec3(1.8, 3.4, 1.8)) + 1.2 * noise(q / vec3(4.5, 9.0, 4.5));
+        for (int k = 0; k < 2; ++k) {
+            float period = k == 0 ? 1.55 : 0.62, deep = lip_folds * (k == 0 ? 0.090 : 0.035) * lips, held = fade(0.65 * period, pixel_mm);
+            float s = d.x + bend * (k == 0 ? 1.0 : 0.7) + 0.31 * float(k), wave = 2.0 * PI / period, g = 0.5 + 0.5 * cos(s * wave);
+            float own = 0.35 + 0.95 * noise(vec3(floor(s / period + 0.5) * 3.7, q.y / 2.6, 2.0 + 7.0 * float(k)));
+            float amp = deep * clamp(own, 0.0, 1.0) * held;
+            h.x -= amp * pow(g, 5.0);
+            h.y += amp * 5.0 * g * g * g * g * 0.5 * sin(s * wave) * wave;
+            lose(r, 0.05 * deep * deep * wave * wave, held);
+        }
+        float plates = fade(0.7, pixel_mm);
+        if (plates > 0.1) {
+            Cells c = cells(q * vec3(1.0, 0.75, 1.0) / 0.95 + 11.0);
+            float gap = c.f2 - c.f1, f = exp(-gap * gap / 0.03);
+            vec3 across = c.d2 / max(c.f2, 1e-3) - c.d1 / max(c.f1, 1e-3);
+            h.yzw += lip_folds * 0.020 * plates * lips * f * 2.0 * gap / 0.03 * across / 0.95;
+        }
     }
     r.h = h;
     return r;
@@ -223,7 +236,7 @@ float mole_at(vec3 q, float skin, inout vec3 gradient) {
 // Skin colour: how much melanin and blood there is, and how thick the epidermis is above it, looked up in the spectral model; over an
 // albedo map the model says by how much more of them darken what it shows.
 vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool mapped, vec3 map) {
-    float lips = lip_of(a.x), inner = seam_of(a.x), flushed = a.y, hair = a.z, eyelid = a.w, beard = beard_tint * b.z, inside = b.w;
+    float rim = lip_mask(p + noise_origin), lips = lip_of(rim), inner = seam_of(rim), flushed = a.y, hair = a.z, eyelid = a.w, beard = beard_tint * b.z, inside = b.w;
     vec3 q = p + noise_origin;
     if (mapped) { lips = 0.0; inner = 0.0; flushed = 0.0; eyelid = 0.0; }
     float broad = noise(q / 24.0), patchy = noise(q / 9.0 + 4.0), small = noise(q / 3.2 + 40.0), fine = noise(q / 1.3 + 2.0) * fade(0.9, pixel_mm);
@@ -290,11 +303,14 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool ma
         dots = mix(0.05, smoothstep(0.24, 0.10, d.f1), fade(0.45, pixel_mm));
     }
     vec3 skin = skin_colour(m / thickness, h, thickness);  // melanin lies at the epidermis's base: a thin one has as much of it
+    // the dry surface and slow blood dull the vermilion, in patches and most outside; wet inside it stays red
+    float dull = lip_haze * lips * clamp(1.0 + 0.5 * small + 0.5 * fine - 0.5 * inner, 0.0, 2.0);
+    skin = mix(skin, dot(skin, vec3(0.2126, 0.7152, 0.0722)) * lip_haze_colour, min(dull, 1.0));
     if (mapped) skin = map * skin / skin_colour(m0 / thickness, h0, thickness);
     skin *= mix(vec3(1.0), scalp_left, hair * scalp_tint) * (1.0 - rooted * rooted_left - shaven * shaven_left - 0.45 * dots * max(rooted, 0.75 * shaven));
     skin *= 1.0 - pore_darkness * vec3(0.85, 1.0, 1.1) * min(pore, 1.0);  // what is in them is brownish
     skin *= 1.0 - veins * layer_mottling * vein * vec3(0.13, 0.06, 0.02);  // red goes deepest, and is missing most (Kienle et al. 1996)
-    return mapped ? skin : mix(skin, inside_colour, inside);
+    return mapped ? skin : skin * mix(vec3(1.0), inside_left, inside);
 }
 
 // A normal turned by the height map: Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU", doi:10.1080/2151237X.2010.10390651.
@@ -403,7 +419,7 @@ void main() {
         if (layer_oil > 0.0) {
             vec3 q = local + noise_origin;
             float patches = 0.45 * noise(q / 21.0 + 91.0) + 0.40 * noise(q / 7.0 + 87.0) + 0.45 * noise(q / 2.0 + 83.0) * fade(1.4, pixel_mm);
-            float lips = lip_of(a.x);
+            float lips = lip_of(lip_mask(q));
             float oil = clamp(b.y * (1.0 + oil_patches * patches) - 0.35 * shade, 0.0, 1.0);
             m = mix(mix(roughness_dry, roughness_oily, oil), roughness_lips * mix(1.15, 0.85, seam_of(a.x)), lips);
             second = mix(mix(lobe_share, lobe_share_oily, oil), lobe_share_oily, lips);
@@ -474,6 +490,6 @@ void main() {
 #ifndef DIFFUSE_ONLY
     for (int k = 0; k < lamps; ++k) through += transmitted(k, world, smooth_n);
 #endif
-    out_transmitted = vec4(mask > 0.0 ? through * (1.0 - b.w) * through_lid(local) : vec3(0.0), 1.0);
+    out_transmitted = vec4(mask > 0.0 ? through * (1.0 - b.w) * through_lid(local) * through_lip(a.x) : vec3(0.0), 1.0);
 #endif
 }

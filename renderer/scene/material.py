@@ -25,8 +25,9 @@ _SHARE = {"low": 0.0, "high": 1.0}
 # of their least and largest size.
 FRECKLE_MEAN, MOTTLING_MEAN, DOTS_MEAN = 0.0074, 0.27, 0.05
 BROWN_MEAN, RED_MEAN = 6.0e-5, 6.9e-5
-# What hair in and over the skin leaves of its colour, and the colour of the mouth's inside.
-SCALP, ROOTED, INSIDE = (0.22, 0.21, 0.21), (0.36, 0.32, 0.27), (0.22, 0.06, 0.06)
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+# What is left of the skin's colour under and between hair, and in the mouth and the nostrils.
+SCALP, ROOTED, INSIDE = (0.22, 0.21, 0.21), (0.36, 0.32, 0.27), (0.50, 0.26, 0.24)
 SHAVEN = (0.21, 0.15, 0.09)  # what roots below shaven skin take of its colour: red most
 #: The medium of a skin that follows from its own pigments.
 PERSON = "person"
@@ -202,6 +203,18 @@ class Skin(Material):
     )
     lip_melanin: float = parameter(0.45, source="of the skin's melanin, by eye", **_SHARE)
     lip_epidermis: float = parameter(0.40, source="of the epidermis, by eye", low=0.1, high=1.0)
+    lip_haze: float = parameter(
+        0.22, source="of the vermilion that its dry surface and venous blood dull, by eye", **_SHARE
+    )
+    lip_haze_colour: tuple[float, float, float] = parameter(
+        (1.16, 0.92, 1.0), unit="of its luminance", low=0.0, high=3.0, source="mauve, by eye"
+    )
+    lip_ragged: float = parameter(
+        0.10, unit="of the mask", low=0.0, high=0.5, source="how uneven the border is, by eye"
+    )
+    lip_muscle: float = parameter(
+        0.95, source="of what comes through a lip, that its muscle stops, by eye", **_SHARE
+    )
     freckles: float = parameter(
         0.035, unit="share of melanin more", low=0.0, high=0.6, source="by eye"
     )
@@ -243,7 +256,7 @@ class Skin(Material):
         source="by eye: a mean roughness of 15 to 30 µm over the first two",
     )
     wrinkles: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.020 to 0.060 mm")
-    lip_folds: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.050 mm")
+    lip_folds: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.090 and 0.035 mm")
     micro_mm: tuple[float, float] = parameter(
         (0.030, 0.018),
         unit="mm over 0.62 and 0.34 mm",
@@ -346,12 +359,15 @@ class Skin(Material):
         """Linear albedo (N, 3) at the scale of bounced light, from masks (N, 8)."""
         column = {name: masks[:, k : k + 1] for k, name in enumerate(MASKS)}
         albedo = skin.shown(self.layers, *self.pigments(masks))
+        lips, inner = lip_places(column["lips"])
+        dull = albedo @ np.array(LUMINANCE)[:, None] * np.array(self.lip_haze_colour)
+        albedo = albedo + self.lip_haze * lips * (1 - 0.5 * inner) * (dull - albedo)
         hair = _smoothstep(0.15, 1.0, column["hair"])
         rooted, shaven = 0.75 * hair, 0.75 * self.beard * column["beard"] * (1 - hair)
         albedo = albedo * (1 + self.scalp * hair * (np.array(SCALP) - 1))
         dots = 0.45 * DOTS_MEAN * np.maximum(rooted, 0.75 * shaven)
         albedo = albedo * (1 - rooted * np.array(ROOTED) - shaven * np.array(SHAVEN) - dots)
-        return albedo + column["inside"] * (np.array(INSIDE) - albedo)
+        return albedo * (1 + column["inside"] * (np.array(INSIDE) - 1))
 
     def own_medium(self, masks: np.ndarray, share: np.ndarray) -> dict:
         """The medium of `medium = "person"`: the layers whose albedo is the mean of what is shown.

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from stimuli.heads import lids, mouth, mpfb, relief, subdivide
+from stimuli.heads import lids, mouth, mpfb, nostrils, relief, subdivide
 from stimuli.heads.lids import Eyeball, Opening
 from stimuli.heads.person import Person
 
@@ -118,6 +118,7 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     made = relief.curves(person.form, reference)
     masks = _sample_masks(images, uvs, uv_quads, quads, len(points))
     close = relief.narrow(made, points) | ((masks["lips"] > 0.05) & (masks["inside-mouth"] < 0.9))
+    close |= nostrils.near(person.form, reference, points)
     close &= levels > 1
 
     # a level more where that is wanted; light is baked a level below
@@ -128,9 +129,14 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     points = both[:, :3]
     masks = _sample_masks(images, uvs, uv_faces, faces, len(points))
     normals = subdivide.vertex_normals(points, faces)
+    plain_normals = subdivide.vertex_normals(both[:, 3:], faces)
+    upper = mouth.above(both[:, 3:], plain_normals, masks["lips"])
+    if any(person.form.vermilion_mm):
+        points = points + mouth.sized(
+            points, normals, faces, masks["lips"], upper, person.form.vermilion_mm
+        )
+        normals = subdivide.vertex_normals(points, faces)
     if person.form.lips_mm:
-        plain_normals = subdivide.vertex_normals(both[:, 3:], faces)
-        upper = mouth.above(both[:, 3:], plain_normals, masks["lips"])
         points = points + mouth.closed(
             points, normals, faces, masks["lips"], upper, person.form.lips_mm
         )
@@ -140,6 +146,8 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     moved += mouth.ridge(
         points, normals, faces, masks["lips"], form.lip_ridge_mm, form.lip_ridge_width_mm
     )
+    bored, masks["nostrils"] = nostrils.opened(form, reference, points, normals)
+    moved += bored
     points, (left, right), openings = lids.fitted(points + moved, faces, balls, person.eyes)
     balls = (left, right)
     normals = subdivide.vertex_normals(points, faces)

@@ -40,8 +40,7 @@ class Place:
     three are taken to the nearest point of the skin. One point is a spot. both: mirrored to the
     other side. fold: it deepens with age from the first year to the second; rises of bone do not.
     taper: shares of the curve over which it sets in and ends. bulge: +1 the swelling lies to the
-    left of the curve's direction seen from outside, -1 to the right. towards: a direction in which
-    the skin is moved instead of along its normal; steep: a flat floor with walls, not a Gauss bell.
+    left of the curve's direction seen from outside, -1 to the right.
     """
 
     points: tuple[tuple[float, ...], ...]
@@ -51,8 +50,6 @@ class Place:
     young: float = 0.0
     taper: tuple[float, float] = (0.3, 0.3)
     bulge: int = 1
-    towards: tuple[float, float, float] | None = None
-    steep: bool = False
 
 
 def _fold(points, height, width, bulge=0.0, bulge_width=5.0, *, ages=(20, 65), **rest) -> Place:
@@ -147,10 +144,6 @@ PLACES: dict[str, Place] = {
     "breastbone": _bone(((0, -205), (0, -250), (0, -300)), -1.8, 8.0, both=False),
     "shoulder_muscle": _bone(((38, -112, 14), (66, -146, 22), (105, -162, 26)), 3.0, 14.0),
     "nipple": _bone(((83, -349),), 1.6, 2.6),
-    # openings
-    "nostril": _bone(
-        ((7.6, -43.0, 152.0), (9.2, -42.5, 148.0), (10.6, -42.0, 144.0)),
-        7.0, 3.4, taper=(0.0, 0.0), towards=(0.0, 0.95, -0.30), steep=True),
 }
 # fmt: on
 
@@ -163,7 +156,10 @@ class Form(Parameters):
     side's are shallower by the share asymmetry, and curves stray by about wander_mm, drawn from
     seed. lips_mm: how far closed lips lie over each other, 0
     leaves them as the mesh has them; lip_ridge_mm: height of the ridge along
-    the vermilion's border, lip_ridge_width_mm wide.
+    the vermilion's border, lip_ridge_width_mm wide; vermilion_mm: heights of the upper and the
+    lower lip's red in the middle, 0 leaves the mesh's. nostril_mm: how deep the nostrils are, 0
+    leaves them closed; nostril_long: their length, of the mesh's own dent's; nostril_wide: their
+    width, of the length; nostril_arch_mm: how far the wing's margin rises over them.
     """
 
     called: ClassVar[str] = "form"
@@ -178,6 +174,13 @@ class Form(Parameters):
     lips_mm: float = parameter(0.7, unit="mm", low=0.0, high=3.0, source="by eye")
     lip_ridge_mm: float = parameter(0.30, unit="mm", low=-1.0, high=2.0, source="by eye")
     lip_ridge_width_mm: float = parameter(1.1, unit="mm", low=0.3, high=5.0, source="by eye")
+    vermilion_mm: tuple[float, float] = parameter(
+        (0.0, 0.0), unit="mm, upper and lower", low=0.0, high=20.0, source="the targets' own"
+    )
+    nostril_mm: float = parameter(6.0, unit="mm", low=0.0, high=12.0, source="by eye")
+    nostril_long: float = parameter(1.0, low=0.5, high=1.6, source="1 is about 9 mm")
+    nostril_wide: float = parameter(0.56, low=0.2, high=1.2, source="by eye")
+    nostril_arch_mm: float = parameter(1.4, unit="mm", low=-1.0, high=4.0, source="by eye")
     relief: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -199,7 +202,7 @@ class Form(Parameters):
     @classmethod
     def none(cls) -> Form:
         """The morphed mesh as it is."""
-        return cls(folds=0.0, bones=0.0, lips_mm=0.0, lip_ridge_mm=0.0)
+        return cls(folds=0.0, bones=0.0, lips_mm=0.0, lip_ridge_mm=0.0, nostril_mm=0.0)
 
     def _usual(self, name: str) -> Relief:
         """What stands in PLACES, at this age."""

@@ -10,6 +10,7 @@ LIPS = 0.5  # of the mask: what is lip
 BIN_MM = 1.0  # across the mouth
 DECAY_MM = 2.6  # from the seam: what is farther from it by more hardly moves
 EVENING = 6
+FOLLOWS_MM = 9.0  # beyond the vermilion's border: how far the skin follows it
 DEEP_MM = 30.0  # behind the foremost point of the lips: no lip any more
 
 
@@ -65,7 +66,7 @@ def closed(points, normals, faces, lips, upper_lip, overlap_mm: float) -> np.nda
     half = 0.5 * np.ptp(x)
     middle = 0.5 * (x[0] + x[-1])
     out = np.abs(points[:, 0] - middle) / half
-    share = np.clip((1.0 - out) / 0.1, 0, 1)
+    share = np.clip((1.06 - out) / 0.08, 0, 1)
     share = share * share * (3 - 2 * share)
     front = points[lips > LIPS][:, 2].max()
     share = share * np.clip((points[:, 2] - front + DEEP_MM) / 8, 0, 1)
@@ -79,26 +80,96 @@ def closed(points, normals, faces, lips, upper_lip, overlap_mm: float) -> np.nda
     return result
 
 
+def _crossings(faces, lips) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (K, 2) that the mask's border crosses, and where along each, (K, 1)."""
+    value = lips - LIPS
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    ends = ends[(value[ends[:, 0]] < 0) != (value[ends[:, 1]] < 0)]
+    a, b = value[ends[:, 0]], value[ends[:, 1]]
+    return ends, (a / (a - b))[:, None]
+
+
+def border(points, faces, lips) -> np.ndarray:
+    """Points (K, 3) on the border of the mask lips (N,), between the vertices."""
+    ends, t = _crossings(faces, lips)
+    return points[ends[:, 0]] * (1 - t) + points[ends[:, 1]] * t
+
+
+def outer_border(points, normals, faces, lips) -> np.ndarray:
+    """Points (K, 3) on the border of the vermilion with the skin, as seen from the front."""
+    ends, _ = _crossings(faces, lips)
+    line = border(points, faces, lips)
+    return line[(line[:, 2] > line[:, 2].max() - DEEP_MM) & (normals[ends[:, 0], 2] > 0.1)]
+
+
+def heights(points, normals, faces, lips) -> tuple[np.ndarray, ...]:
+    """x (K,), the seam's height there and the vermilion's above and below it, (K,) mm each."""
+    x, upper, lower = seam(points, normals, lips)
+    between = 0.5 * (upper + lower)
+    line = outer_border(points, normals, faces, lips)
+    over = line[:, 1] - np.interp(line[:, 0], x, between)
+    found = []
+    for way in (1, -1):
+        own = way * over > 0
+        order = np.argsort(line[own, 0])
+        at, high = line[own, 0][order], way * over[own][order]
+        # the mean about each place; the border is a dense cloud of points
+        near = np.exp(-(((x[:, None] - at) / BIN_MM) ** 2))
+        found.append((near @ high) / np.maximum(near.sum(axis=1), 1e-9))
+    return x, between, *found
+
+
+def sized(points, normals, faces, lips, upper_lip, wanted_mm) -> np.ndarray:
+    """How far vertices are moved (N, 3) so that the vermilion is as high in the middle as
+    wanted_mm, (upper, lower), says; 0 leaves a lip as it is.
+
+    Heights above the seam are scaled, and what a lip stands out before its border by the same
+    factor; the skin beyond follows over FOLLOWS_MM.
+    """
+    x, between, *found = heights(points, normals, faces, lips)
+    line = outer_border(points, normals, faces, lips)
+    middle = 0.5 * (x[0] + x[-1])
+    front = points[lips > LIPS][:, 2].max()
+    deep = np.clip((points[:, 2] - front + DEEP_MM) / 8, 0, 1)
+    off = points[:, 1] - np.interp(points[:, 0], x, between)
+    edge = 0.5 * np.ptp(x) / 0.97
+    out = np.append(np.append(middle - edge, x), middle + edge)
+    result = np.zeros_like(points)
+    for way, own, high, wanted in (
+        (1, upper_lip, found[0], wanted_mm[0]),
+        (-1, ~upper_lip, found[1], wanted_mm[1]),
+    ):
+        if not wanted:
+            continue
+        factor = wanted / np.interp(middle, x, high)
+        high = np.interp(points[:, 0], out, np.pad(high, 1))
+        from_seam = np.maximum(way * off, 0)
+        beyond = np.maximum(from_seam - high, 0)
+        change = (factor - 1) * np.minimum(from_seam, high) * np.exp(-((beyond / FOLLOWS_MM) ** 2))
+        result[own, 1] += (way * deep * change)[own]
+        rim = line[way * (line[:, 1] - np.interp(line[:, 0], x, between)) > 0]
+        near = np.exp(-(((x[:, None] - rim[:, 0]) / BIN_MM) ** 2))
+        base = np.interp(points[:, 0], x, near @ rim[:, 2] / np.maximum(near.sum(axis=1), 1e-9))
+        stands = np.maximum(points[:, 2] - base, 0) * np.clip((high - from_seam) / 1.0, 0, 1)
+        result[own, 2] += ((factor - 1) * deep * stands)[own]
+    for axis in (1, 2):
+        result[:, axis] = _evened(result[:, axis], faces)
+    return result
+
+
 def ridge(points, normals, faces, lips, height_mm: float, width_mm: float) -> np.ndarray:
     """How far vertices are moved (N, 3) by the roll along the border of the vermilion, just outside
     it.
     """
     if height_mm == 0:
         return np.zeros_like(points)
-    value = lips - LIPS
-    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    ends = ends[(value[ends[:, 0]] < 0) != (value[ends[:, 1]] < 0)]
-    a, b = value[ends[:, 0]], value[ends[:, 1]]
-    t = (a / (a - b))[:, None]
-    border = points[ends[:, 0]] * (1 - t) + points[ends[:, 1]] * t
-    front = border[:, 2] > border[:, 2].max() - DEEP_MM
-    border = border[front & (normals[ends[:, 0], 2] > 0.1)]
-    distance, _ = cKDTree(border).query(points, distance_upper_bound=4 * width_mm)
+    line = outer_border(points, normals, faces, lips)
+    distance, _ = cKDTree(line).query(points, distance_upper_bound=4 * width_mm)
     near = np.isfinite(distance) & (normals[:, 2] > 0)
     signed = np.where(lips > LIPS, -distance, distance)[near]
     height = height_mm * np.exp(-(((signed - 0.35 * width_mm) / width_mm) ** 2))
     # none where the lips end in the corners of the mouth
-    middle, half = 0.5 * (border[:, 0].min() + border[:, 0].max()), 0.5 * np.ptp(border[:, 0])
+    middle, half = 0.5 * (line[:, 0].min() + line[:, 0].max()), 0.5 * np.ptp(line[:, 0])
     out = np.abs(points[near, 0] - middle) / half
     height *= np.clip((0.96 - out) / 0.25, 0, 1)
     rise = np.zeros(len(points))

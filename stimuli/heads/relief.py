@@ -135,8 +135,8 @@ def narrow(made: list[Curve], points: np.ndarray) -> np.ndarray:
     near = np.zeros(len(points), bool)
     for curve in made:
         wide = curve.relief.width_mm
-        if wide < NARROW_MM or curve.place.steep:
-            reach = 1.5 + (2.2 if curve.place.steep else 1.8) * wide
+        if wide < NARROW_MM:
+            reach = 1.5 + 1.8 * wide
             distance, _ = cKDTree(curve.points).query(points, distance_upper_bound=reach)
             near |= np.isfinite(distance)
     return near
@@ -158,7 +158,7 @@ def offsets(made: list[Curve], points: np.ndarray, normals: np.ndarray) -> np.nd
         along = np.clip((away * tangent).sum(axis=1), -STEP_MM / 2, STEP_MM / 2)
         away -= along[:, None] * tangent
         flat = away - (away * normal).sum(axis=1, keepdims=True) * normal
-        d = np.linalg.norm(flat if not place.steep else away, axis=1)
+        d = np.linalg.norm(flat, axis=1)
         begin, end = place.taper
         t = curve.along[which]
         share = np.ones(len(t))
@@ -166,16 +166,12 @@ def offsets(made: list[Curve], points: np.ndarray, normals: np.ndarray) -> np.nd
             share *= _ramp(t / begin) if begin else 1.0
             share *= _ramp((1 - t) / end) if end else 1.0
         facing = (normals[near] * normal).sum(axis=1)
-        share *= _ramp((facing - 0.05) / 0.35) if not place.steep else _ramp((facing + 0.5) / 0.4)
-        power = 4 if place.steep else 2
-        height = relief.height_mm * np.exp(-((d / relief.width_mm) ** power))
+        share *= _ramp((facing - 0.05) / 0.35)
+        height = relief.height_mm * np.exp(-((d / relief.width_mm) ** 2))
         if relief.bulge_mm:
             across = np.cross(normal, tangent)
             outer = (flat * across).sum(axis=1) * (-place.bulge if curve.side < 0 else place.bulge)
             x = np.maximum(outer, 0) / relief.bulge_width_mm
             height += relief.bulge_mm * x**2 * np.exp(1 - x**2)
-        if place.towards is None:
-            result[near] += (share * height)[:, None] * normals[near]
-        else:
-            result[near] += (share * height)[:, None] * np.array(place.towards)
+        result[near] += (share * height)[:, None] * normals[near]
     return result

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from renderer.scene import MASKS
+from stimuli.heads import mouth as mouths
 from stimuli.heads.anatomy import Anatomy, Bust
 from stimuli.heads.regions import Regions
 
@@ -53,7 +54,7 @@ def _rim(p: np.ndarray, ear: np.ndarray, regions: Regions) -> np.ndarray:
 BORDER_MM = 1.4
 
 
-def _lips(p: np.ndarray, own: dict[str, np.ndarray]) -> np.ndarray:
+def _lips(p: np.ndarray, faces: np.ndarray, own: dict[str, np.ndarray]) -> np.ndarray:
     """Lips (N,): 0 outside, 0.5 at their border, 1 at the seam, where the mouth's inside begins."""
     from scipy.spatial import cKDTree
 
@@ -70,9 +71,14 @@ def _lips(p: np.ndarray, own: dict[str, np.ndarray]) -> np.ndarray:
             return np.full(of.sum(), reach)
         return np.minimum(cKDTree(p[to]).query(p[of], distance_upper_bound=reach)[0], reach)
 
-    border, seam = distance(lip, skin), distance(lip, inside)
+    line = mouths.border(p, faces, own["lips"])
+
+    def border_distance(of: np.ndarray) -> np.ndarray:
+        return np.minimum(cKDTree(line).query(p[of], distance_upper_bound=reach)[0], reach)
+
+    border, seam = border_distance(lip), distance(lip, inside)
     out[lip] = 0.5 + 0.5 * border / (border + seam)
-    out[skin] = 0.5 * (1 - smoothstep(0.0, BORDER_MM, distance(skin, lip)))
+    out[skin] = 0.5 * (1 - smoothstep(0.0, BORDER_MM, border_distance(skin)))
     out[inside] = 1 - smoothstep(0.0, 4.0, distance(inside, lip))
     return out
 
@@ -138,6 +144,7 @@ def masks(
     beard *= 1 + regions.beard_patchy * _wobble(p[:, [2, 0, 1]], regions.beard_patch_mm)
     beard *= (1 - hair) * off_ear
     inside = smoothstep(0.35, 0.8, own["inside-mouth"]) * (1 - smoothstep(0.05, 0.4, own["lips"]))
+    inside = np.maximum(inside, own["nostrils"])
 
     surface = lambda x, y: p[
         np.argmin((p[:, 0] - x) ** 2 + (p[:, 1] - y) ** 2 + 1e3 * (p[:, 2] < 60))
@@ -177,7 +184,7 @@ def masks(
     for name, share in regions.smooth.items():
         pores *= 1 - share * places[name]
     columns = {
-        "lips": _lips(p, own),
+        "lips": _lips(p, bust.faces, own),
         "flush": flush,
         "hair": hair,
         "eyelid": thin,

@@ -59,6 +59,35 @@ def test_closed_lips_lie_over_each_other(folded):
     assert depth.min() > front - 18  # a ray between the lips does not pass them
 
 
+def test_the_vermilion_is_as_high_as_its_field(folded):
+    sized = build(Form(folds=0.0, bones=0.0, vermilion_mm=(5.0, 8.0))).fine
+    for bust, tolerance in ((sized, 0.35), (folded.fine, None)):
+        shape = (bust.positions, bust.normals, bust.faces, bust.masks["lips"])
+        x, _, upper, lower = mouth.heights(*shape)
+        middle = 0.5 * (x[0] + x[-1])
+        own = np.interp(middle, x, upper), np.interp(middle, x, lower)
+        if tolerance:
+            np.testing.assert_allclose(own, (5.0, 8.0), atol=tolerance)
+        else:  # the mesh's own lips are fuller
+            assert own[0] > 6 and own[1] > 9
+
+
+def test_nostrils_are_open_and_as_deep_as_their_field(folded):
+    closed = build(Form(folds=0.0, bones=0.0, wander_mm=0.0, nostril_mm=0.0)).fine
+    p, dark = folded.fine.positions, folded.fine.masks["nostrils"]
+    bore = np.array([0.0, 0.94, -0.34]) / np.hypot(0.94, 0.34)
+    for side in (1, -1):
+        lining = p[(dark > 0.9) & (side * p[:, 0] > 0)]
+        below = lining[(lining @ bore).argmax()] - 10 * bore
+        origins = below + np.outer(np.linspace(-1.5, 1.5, 7), [0.0, 0.0, 1.0])
+        up = np.tile(bore, (7, 1))
+        deeper = first(folded.fine, origins, up) - first(closed, origins, up)
+        np.testing.assert_allclose(deeper.max(), Form().nostril_mm, atol=0.8)
+    assert not closed.masks["nostrils"].any()
+    # only what faces down is lining: the wings' outer skin is not
+    assert dark[folded.fine.normals @ bore > 0.75].max() == 0
+
+
 def test_a_shirt_lies_over_the_skin_and_hides_what_is_left_out(folded):
     from scipy.spatial import cKDTree
 
