@@ -178,9 +178,9 @@ class Form(Parameters):
         (0.0, 0.0), unit="mm, upper and lower", low=0.0, high=20.0, source="the targets' own"
     )
     nostril_mm: float = parameter(6.0, unit="mm", low=0.0, high=12.0, source="by eye")
-    nostril_long: float = parameter(1.0, low=0.5, high=1.6, source="1 is about 9 mm")
-    nostril_wide: float = parameter(0.56, low=0.2, high=1.2, source="by eye")
-    nostril_arch_mm: float = parameter(1.4, unit="mm", low=-1.0, high=4.0, source="by eye")
+    nostril_long: float = parameter(0.92, low=0.5, high=1.6, source="1 is about 9 mm")
+    nostril_wide: float = parameter(0.50, low=0.2, high=1.2, source="by eye")
+    nostril_arch_mm: float = parameter(1.0, unit="mm", low=-1.0, high=4.0, source="by eye")
     relief: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -149,6 +149,7 @@ def draw(seed: int, bounds: Bounds | None = None) -> dict[str, Any]:
             "asymmetry": _rounded(rng.uniform(0.06, 0.25)),
             "weaker": ("left", "right")[rng.integers(2)],
             "seed": int(rng.integers(2**31)),
+            "vermilion_mm": _lips(int(seed), sex, age, ancestry[0]),
         },
         "torso_yaw_deg": _rounded(rng.uniform(-14, 14), 1),
         "clothes": {"colour": _cloth(rng), "power": _rounded(rng.uniform(1.4, 2.4), 2)},
@@ -237,6 +238,16 @@ def _face(rng: np.random.Generator, sex: str, age: float, apart: float) -> dict[
     return {name: weight for name, weight in table.items() if weight >= 0.005}
 
 
+def _lips(seed: int, sex: str, age: float, african: float) -> list[float]:
+    """Heights of the upper and the lower lip's red in mm: more of it with African ancestry, less
+    with age.
+    """
+    rng = np.random.default_rng([seed, 20261126, 1])
+    upper = (5.9 if sex == "female" else 5.2) + 1.7 * african - 0.03 * max(age - 30, 0)
+    upper += float(np.clip(rng.normal(0, 0.5), -1.0, 1.0))
+    return [_rounded(upper, 2), _rounded(upper * np.clip(rng.normal(1.55, 0.08), 1.35, 1.75), 2)]
+
+
 def _eyes(rng: np.random.Generator, light: float, tone: float, age: float) -> dict[str, Any]:
     names = list(_IRISES)
     odds = [(1 - light) * _IRISES[n][3] + light * _IRISES[n][4] for n in names]
@@ -322,6 +333,7 @@ def _skin(rng, sex: str, age: float, tone: float, light: float, hair) -> dict[st
         "spots_mm": [0.9, _rounded(rng.uniform(1.8, 2.6) + 2.2 * aged, 2)],
         "red_share": _rounded(rng.uniform(0.25, 0.5) * (1 - tone), 2),
         "lip_melanin": _rounded(0.45 + 0.3 * tone, 2),
+        "lip_haze": _rounded(0.20 + 0.32 * tone**2, 2),
         "moles": _rounded(rng.uniform(0.15, 0.35), 2),
         "mole_share": _rounded(rng.uniform(0.08, 0.28), 2),
         "mottling": _rounded(rng.uniform(0.7, 1.2) + 0.4 * np.clip((age - 45) / 30, 0, 1), 2),

@@ -75,6 +75,6 @@ def opened(
         margin *= np.exp(-((along / 4.0) ** 2)) * _ramp((REACH - r) / 0.8) * close
         way = form.nostril_mm * share + form.nostril_arch_mm * margin
         moved += way[:, None] * axes[2]
-        lining = _ramp((1.12 - r) / 0.35) * _ramp((0.7 - normals @ axes[2]) / 0.5)
+        lining = _ramp((1.0 - r) / 0.45) * _ramp((0.7 - normals @ axes[2]) / 0.5)
         deep = np.maximum(deep, lining * _ramp((ABOUT_MM - np.abs(along)) / 1.5))
     return moved, deep
