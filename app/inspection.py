@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 from PIL import Image
 
 from analysis.files import replacing
+from app.renditions import FOLDER, Rendition, rendition
 from stimuli.manifest import Manifest
+from stimuli.viewing import Screen, shown_size
 
 _HERE = Path(__file__).resolve().parent
 #: The viewer's modules, what is imported first; on the page they are one script, as files opened
@@ -29,6 +32,48 @@ KINDS = {
     "outside": "Differences outside the skin",
     "alike": "Pairs that look alike",
 }
+
+
+@dataclass(frozen=True)
+class Fetched:
+    """What the browser of somebody who is asked every pair fetches: images once each, in bytes."""
+
+    images: int
+    webp: int
+    png: int
+    screen: Screen
+
+    @property
+    def words(self) -> str:
+        webp, png = (f"{size / 1e6:.2f} MB" for size in (self.webp, self.png))
+        return (
+            f"a browser on {self.screen.width}x{self.screen.height} fetches {self.images} images: "
+            f"{webp} of lossless WebP, {png} of PNG where it takes no other"
+        )
+
+
+def fetched(manifest: Manifest) -> Fetched:
+    """The same, at the size at which a question begins on the study's `[viewer.screen]`. Made as
+    the server makes it and kept where it looks first, so that nobody waits for it.
+    """
+    viewer = manifest.study.viewer
+    screen = viewer.screen or Screen()
+    wanted = []
+    for image in manifest.images:
+        natural = Rendition(image, 0).natural
+        shown = shown_size(viewer, screen, natural)
+        width = shown.width if shown.fitted else natural[0]
+        reference = manifest.reference(image.cell)
+        if reference is not None:
+            wanted.append(Rendition(reference, width))
+        if viewer.boost is None:
+            wanted.append(Rendition(image, width))
+        else:
+            wanted.append(Rendition(image, width, reference, viewer.boost.amplify))
+    kept = manifest.directory / FOLDER
+    each = {one.name: one for one in wanted}.values()
+    sizes = [sum(len(rendition(one, kept, webp=webp)[0]) for one in each) for webp in (True, False)]
+    return Fetched(len(each), *sizes, screen)
 
 
 def script() -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,6 +29,9 @@ RECORDED = (
     message("how long the page was out of sight"),
     message("the language of the pages"),
 )
+
+#: The words of a sentence before a colon that nothing follows.
+_LEAD = re.compile(r"(?:^|(?<=[.!?。！？]))\s*(?P<words>[^.!?。！？:：]+?)\s*[:：]\s*$")
 
 
 def minutes(definition: Definition) -> tuple[int, int]:
@@ -152,6 +156,32 @@ class Study:
         """The paragraphs of the consent text in a language, with what is asked and stored filled
         in.
         """
+        recorded = self._recorded(catalogue(language))
+        return tuple(text.replace("{recorded}", recorded) for text in self._consent(language))
+
+    def consent_parts(self, language: str) -> tuple[tuple[str, str | tuple[str, ...]], ...]:
+        """The same words as a page shows them: ("text", a paragraph); where a sentence is a few
+        words, a colon and `{recorded}`, those words as ("heading", text) and ("list", what is
+        stored, one thing after the other).
+        """
+        result = []
+        for text in self._consent(language):
+            before, _, after = text.partition("{recorded}")
+            lead = _LEAD.search(before)
+            if lead is None or after[:1] not in ("", ".", "。") or "{recorded}" in after:
+                filled = text.replace("{recorded}", self._recorded(catalogue(language)))
+                result.append(("text", filled))
+                continue
+            if first := before[: lead.start()].strip():
+                result.append(("text", first))
+            result.append(("heading", lead["words"]))
+            result.append(("list", self._stored(catalogue(language))))
+            if last := after[1:].strip():
+                result.append(("text", last))
+        return tuple(result)
+
+    def _consent(self, language: str) -> list[str]:
+        """The paragraphs with `{recorded}` as it stands."""
         words = catalogue(language)
         low, high = minutes(self.definition)
         filled = {
@@ -159,12 +189,11 @@ class Study:
             "minutes": str(low)
             if low == high
             else words.gettext("%(low)s to %(high)s") % {"low": low, "high": high},
-            "recorded": self._recorded(words),
         }
         text = self.in_language(language).consent
         for name, value in filled.items():
             text = text.replace(f"{{{name}}}", value)
-        return tuple(text.split("\n\n"))
+        return text.split("\n\n")
 
     def consent_sha256(self, language: str) -> str:
         """The hash of the consent text in a language as the page shows it; the same hash is the
@@ -172,7 +201,7 @@ class Study:
         """
         return hashlib.sha256("\n\n".join(self.consent(language)).encode()).hexdigest()
 
-    def _recorded(self, words: NullTranslations) -> str:
+    def _stored(self, words: NullTranslations) -> tuple[str, ...]:
         """What is stored of a participant, with what this study asks beside the pairs."""
         definition, parts = self.definition, [words.gettext(part) for part in RECORDED]
         if own := len(definition.before) + len(definition.after):
@@ -191,8 +220,13 @@ class Study:
         if names := ", ".join(definition.recruiting.parameters):
             text = words.gettext("what your recruiter's link says of you (%(names)s)")
             parts.append(text % {"names": names})
-        several = words.gettext("; ").join(parts[:-1])
-        return words.gettext("%(several)s; and %(last)s") % {"several": several, "last": parts[-1]}
+        return tuple(parts)
+
+    def _recorded(self, words: NullTranslations) -> str:
+        """The same as a part of a sentence."""
+        *several, last = self._stored(words)
+        several = words.gettext("; ").join(several)
+        return words.gettext("%(several)s; and %(last)s") % {"several": several, "last": last}
 
     def database_url(self, simulated: bool) -> str:
         return (

@@ -59,4 +59,5 @@ def command(folder: Path, out: Path | None, limits: dict[str, float]) -> None:
     page = inspection.write(manifest, found, out)
     for flag in found.flags:
         click.echo(f"{flag.cell}: {flag.words}")
+    click.echo(inspection.fetched(manifest).words)
     click.echo(f"{page}: {len(manifest.images)} images, {len(found.flags)} flags")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from datetime import datetime, timedelta
 from math import isnan
 from threading import Lock
@@ -35,6 +36,18 @@ CLAIM = timedelta(minutes=1)
 #: By the server's clock, all answers together came faster than the rule for their median allows;
 #: and a browser said that an answer took longer than its question had been there.
 TOO_FAST, TIMES_DOUBTFUL = "too_fast", "times_doubtful"
+#: What tables say of who breaks a rule, by the rule's name in the study's [analysis.exclusions].
+BREAKS = {
+    "answered_share": "few answers",
+    "one_side_share": "one side",
+    "median_rt_ms": "very fast",
+    "same_answer_share": "one answer",
+    "zeta": "incoherent",
+    "repeat_share": "repeats differ",
+    "trap_share": "traps missed",
+    TOO_FAST: "fast by the server's clock",
+    TIMES_DOUBTFUL: "times in doubt",
+}
 #: Participants on the page that updates itself; all are on a page of their own.
 LATEST = 10
 #: Without an answer for this long, an unfinished participant counts as dropped out (and may still
@@ -167,7 +180,9 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
         func.count(Response.rt_reported_ms),
     )
     given = {row[0]: row[1:] for row in db.execute(counted.group_by(Response.participant_id))}
-    fastest_ms = rules(study).median_rt_ms
+    # programs need no time
+    people = recruiting.record_of(db).kind == "real"
+    fastest_ms = rules(study).median_rt_ms if people else None
     asked = dict(
         db.execute(select(Trial.participant_id, func.count()).group_by(Trial.participant_id)).all()
     )
@@ -217,6 +232,11 @@ def participants(db: Session, study: Study, answers: Responses | None) -> list[d
             }
         )
     return result
+
+
+def in_words(flags: str) -> str:
+    """Of the `flags` of `participants`, what people read; for templates."""
+    return ", ".join(BREAKS[name] for name in re.split("[;,] ", flags)) if flags else ""
 
 
 def quality(study: Study, answers: Responses | None) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from app.security import REPORT_POLICY
 from app.web import database, download, hosted, simulated, study
 
 blueprint = Blueprint("dashboard", __name__, url_prefix="/dashboard")
+blueprint.add_app_template_filter(live.in_words)
 #: Of the log, on the page; log.csv has all.
 LATEST_ENTRIES = 10
 

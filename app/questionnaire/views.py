@@ -97,7 +97,7 @@ def welcome():
                 return _closed(door)
             return render_template(
                 "questionnaire/consent.html",
-                paragraphs=study().consent(language.current()),
+                parts=study().consent_parts(language.current()),
                 # in no order that says anything: which are asked first is not drawn yet
                 upcoming=[
                     side(image)

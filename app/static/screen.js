@@ -16,7 +16,8 @@ function look() {
   const measured = measures();
   for (const [name, value] of Object.entries(measured)) field(name).value = value;
   const pixels = [measured.window_width, measured.window_height].map((side) => Math.round(side * measured.device_pixel_ratio));
-  form.querySelector("[data-window]").textContent = `(${pixels.join(" × ")})`;
+  const said = form.querySelector("[data-window]");
+  said.textContent = said.dataset.window.replace("{width}", pixels[0]).replace("{height}", pixels[1]);
   const card = form.querySelector(".bank-card"), stripes = form.querySelector("[data-grey]"), steps = form.querySelector("[data-steps]");
   if (card) {
     const long = Number(field("card_width").value), sides = [long, long / CARD_RATIO];

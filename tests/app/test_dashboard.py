@@ -1,6 +1,7 @@
 """What the experimenter sees and downloads."""
 
 import csv
+import dataclasses
 import hashlib
 import io
 import json
@@ -10,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from markupsafe import escape
 from sqlalchemy import func, select
 
 from analysis.agreement import consistency
@@ -182,6 +184,13 @@ def test_numbers_are_made_once_for_all_who_look(person, experimenter, app, monke
     assert f'data-version="{version}"' in experimenter.get("/dashboard/").text
 
 
+def test_every_rule_of_exclusion_has_words():
+    rules = {field.name for field in dataclasses.fields(Options().exclusions)}
+    assert {*live.BREAKS} == rules | {live.TOO_FAST, live.TIMES_DOUBTFUL}
+    words = live.in_words("zeta; trap_share, too_fast")
+    assert words == "incoherent, traps missed, fast by the server's clock"
+
+
 def test_who_breaks_a_rule_and_where_people_stop(person, experimenter, app):
     person().begin().answer(*[2] * 30)  # always the same side, and in 1,234 ms
     person().begin().answer(1, -1)
@@ -192,6 +201,11 @@ def test_who_breaks_a_rule_and_where_people_stop(person, experimenter, app):
     flags = {one["code"]: one["flags"] for one in numbers["participants"]}
     assert "one_side_share" in flags["P0001"] and "same_answer_share" in flags["P0001"]
     assert "answered_share" in flags["P0002"]
+    said = {code: live.in_words(one) for code, one in flags.items()}
+    assert {*said["P0001"].split(", ")} >= {"one side", "one answer"}
+    assert all(escape(words) in numbers["html"] for words in said.values())
+    assert "_share" not in numbers["html"]
+    assert escape(said["P0001"]) in experimenter.get("/dashboard/participants/P0001").text
     assert numbers["stopped"] == [{"answered": 2, "people": 1}]
     assert "Stopped after 2 answers." in " ".join(numbers["html"].split())
     rows = table(experimenter.get("/dashboard/participants.csv"))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import inspection
+from app import create_app, inspection, web
 from app.cli import main
 from stimuli.errors import InputError
 from stimuli.inspect import Limits, inspect, noise
@@ -185,3 +185,33 @@ def test_titles_are_escaped_and_the_script_is_whole(study):
     script = inspection.script()
     assert "import " not in script.split("class Viewer")[0] and "export" not in script
     assert "class Viewer" in script
+
+
+@pytest.mark.parametrize(
+    ("viewer", "width"),
+    [
+        ({"display": "1:1"}, WIDTH),
+        ({"display": "fit"}, 384),  # four times as wide, a step of 16 pixels
+        ({"modes": ["boosted"], "reference": "golubev", "boost": {"amplify": 3}}, WIDTH),
+    ],
+)
+def test_what_a_browser_fetches_is_what_the_server_sends(tmp_path, write_study, viewer, width):
+    folder = write_study(tmp_path / "study", size=(WIDTH, HEIGHT), viewer=viewer)
+    found = inspection.fetched(load_manifest(folder))
+    app = create_app(folder, f"sqlite:///{tmp_path}/db")
+    sizes = {"image/webp": 0, "image/png": 0}
+    with app.test_request_context():
+        pictures = [web.side(one) for one in app.extensions["study"].manifest.images]
+        if "reference" in viewer:
+            cells = app.extensions["study"].cells
+            pictures += [
+                web.picture(app.extensions["study"].manifest.reference(cell)) for cell in cells
+            ]
+    for address in {one["address"] for one in pictures}:
+        for accept in sizes:
+            sent = app.test_client().get(f"{address}{width}", headers={"Accept": accept})
+            assert sent.mimetype == accept
+            sizes[accept] += len(sent.data)
+    assert (found.webp, found.png) == tuple(sizes.values())
+    assert found.images == len({one["address"] for one in pictures})
+    assert "on 1920x1080" in found.words

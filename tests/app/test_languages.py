@@ -155,6 +155,36 @@ def test_the_table_says_in_which_language_and_the_codebook_which_consent(person,
     assert f"consent in zh: `{row['consent_sha256']}`" in export.codebook_md(study, simulated=False)
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_what_is_stored_is_a_list_of_the_words_that_are_hashed(app, language):
+    study = app.extensions["study"]
+    parts = study.consent_parts(language)
+    assert [kind for kind, _ in parts] == ["text", "heading", "list", "text"]
+    said = "\n\n".join(study.consent(language))
+    for kind, part in parts:
+        for one in part if kind == "list" else (part,):
+            assert one in said
+    assert len(dict(parts)["list"]) >= len(RECORDED)
+
+
+@pytest.mark.parametrize(
+    ("text", "kinds"),
+    [
+        ("What is stored: {recorded}.", "heading list"),
+        ("One.\n\nTwo. Stored: {recorded}", "text text heading list"),
+        ("Stored are {recorded}.", "text"),  # no colon
+        ("Stored: {recorded}, for ten years.", "text"),  # the sentence goes on
+        ("No.", "text"),
+    ],
+)
+def test_a_consent_of_the_studys_own_is_a_list_where_it_can_be(tmp_path, write_study, text, kinds):
+    study = create_app(write_study(tmp_path / "study", consent=text)).extensions["study"]
+    parts = study.consent_parts("en")
+    assert " ".join(kind for kind, _ in parts) == kinds
+    plain = " ".join(one for kind, one in parts if kind == "text")
+    assert "{recorded}" not in plain and ("your self-rating; " in plain) == ("Stored" in plain)
+
+
 @pytest.mark.parametrize("language", FURTHER)
 def test_no_page_mixes_languages(person, language, asked):
     """No message of the sources stands on a page of another language."""
