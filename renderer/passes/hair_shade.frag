@@ -6,8 +6,9 @@
 #include "shaders/lighting.glsl"
 uniform sampler2D places; uniform sampler2D tangents; uniform sampler2D covers;
 uniform sampler2D colours;       // a strand's: rgb: what two ways through the fibre leave of light
-uniform sampler2D environments;  // a strand's: light from everywhere on the skin at the root
+uniform sampler2D environments;  // a strand's: light from everywhere on the skin at the root; w: its first point
 uniform sampler2DArray lit_map;  // (passes/hair_lit.frag)
+uniform vec2 leaves;             // mm from the root: hair that hangs far from it is lit from where it is
 uniform float extinction;        // of the whole layer along its normal
 uniform float tilt;              // of the cuticle's scales, radians
 uniform float spread;            // standard deviation of R, radians
@@ -42,16 +43,23 @@ void main() {
     vec4 cover = texelFetch(covers, at, 0);
     int strand = int(t.w + 0.5), columns = textureSize(colours, 0).x;
     ivec2 own = ivec2(strand % columns, strand / columns);
-    vec3 colour = texelFetch(colours, own, 0).rgb, around = texelFetch(environments, own, 0).rgb;
+    vec3 colour = texelFetch(colours, own, 0).rgb;
+    vec4 rooted = texelFetch(environments, own, 0);
+    int first = int(rooted.w + 0.5);
     vec3 v = normalize(camera_position - p);
     float root = (index - 1.0) / (index + 1.0), f0 = root * root;
     vec3 forward = sqrt(max(colour, 1e-4));  // one way through, what a fibre passes on
     // light from everywhere: past the layer above, back from the fibre or through it and back from another, and mirrored
-    float open_to = exp(-extinction * cover.w);
+    float away = distance(p, texelFetch(places, ivec2(first % textureSize(places, 0).x, first / textureSize(places, 0).x), 0).xyz);
+    float hanging = smoothstep(leaves.x, leaves.y, away);
+    // what is seen of a curtain of hair is open towards who sees it
+    float open_to = exp(-extinction * cover.w * (1.0 - 0.6 * hanging));
     vec3 n = cover.xyz - t.xyz * dot(cover.xyz, t.xyz);
-    n += 0.35 * (v - t.xyz * dot(v, t.xyz));
+    n += mix(0.35, 1.5, hanging) * (v - t.xyz * dot(v, t.xyz));
     n /= max(length(n), 1e-3);
-    vec3 sum = around * open_to * (colour + 0.12 * forward) / PI;
+    // a neck stands somewhere behind it
+    vec3 around = mix(rooted.rgb, 0.8 * PI * environment(n, 2.0), hanging);
+    vec3 sum = around * open_to * (colour + 0.2 * forward) / PI;
     float facing = max(dot(n, v), 0.05);
     sum += environment(reflect(-v, n), 6.0) * schlick(f0, facing) * open_to * 0.1;
     for (int k = 0; k < lamps; ++k) {

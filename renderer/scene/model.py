@@ -151,7 +151,7 @@ class Strands:
     cover: np.ndarray
     root_vertex: np.ndarray
     tilt_deg: float = 3.5
-    spread_deg: float = 6.0
+    spread_deg: float = 7.5
     index: float = 1.55
 
 

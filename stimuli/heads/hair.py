@@ -372,10 +372,10 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: 
 
         fine = rng.random(count + int(own.brow_fine * count)) >= 1 / (1 + own.brow_fine)
         many = len(fine)
-        u = rng.uniform(-0.03, 1.06, 8 * many)
-        there = smoothstep(-0.04, 0.16, u) * (1 - 0.86 * smoothstep(0.66, 1.06, u))
+        u = rng.uniform(-0.03, 1.0, 8 * many)
+        there = smoothstep(-0.04, 0.16, u) * (1 - 0.75 * smoothstep(0.60, 1.0, u))
         u = u[rng.random(len(u)) < there][:many]
-        half = own.brow_half_mm * (1 - 0.62 * smoothstep(0.42, 1.05, u))
+        half = own.brow_half_mm * (1 - 0.60 * smoothstep(0.42, 1.0, u))
         half = half * (0.70 + 0.30 * smoothstep(-0.05, 0.30, u))
         half = half * (1 + 0.09 * np.sin(9 * u + phase[0]) + 0.07 * np.sin(23 * u + phase[1]))
         v = rng.normal(size=many) * np.where(fine, 0.60, 0.46)
@@ -386,7 +386,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: 
         )
         along = np.arctan2(arc(u + 0.02) - arc(u - 0.02), 0.04 * long)
         head, tail = 1 - smoothstep(0.0, 0.34, u), smoothstep(0.55, 1.0, u)
-        tilt = along + turn + np.radians(14 + 58 * head - 12 * tail)
+        tilt = along + turn + np.radians(14 + 58 * head - 28 * tail)
         tilt = tilt - np.radians(30) * (1 - 0.6 * head) * (1 - 0.4 * tail) * v
         tilt = tilt + 0.10 * np.sin(31 * u + 4 * v + phase[2]) + 0.16 * rng.normal(size=many)
         ends = tilt - np.radians(rng.uniform(4, 34, many)) * (0.5 + head) * np.sign(v + 0.6)
@@ -404,7 +404,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: 
             roots, on_skin(tilt), length, lift, 1.3 * lift, rng, frizz=0.05, towards=on_skin(ends)
         )
         width = own.brow_width_mm * np.clip(1 + 0.18 * rng.normal(size=many), 0.6, 1.5)
-        width = width * (1 - 0.35 * np.clip(np.abs(v) - 0.6, 0, 1)) * (1 - 0.25 * tail)
+        width = width * (1 - 0.35 * np.clip(np.abs(v) - 0.6, 0, 1)) * (1 - 0.40 * tail)
         tone = np.log(own.brow_light) + own.lightness * rng.normal(size=many) + 0.5 * fine
         packed = _pack(
             points,

@@ -139,6 +139,8 @@ def draw(seed: int, bounds: Bounds | None = None) -> dict[str, Any]:
     eyes = _eyes(rng, light, tone, age)
     hair = _hair(rng, sex, age, light, tone, ancestry)
     skin_table = _skin(rng, sex, age, tone, light, hair["colour"])
+    if hair["grey"] > 0:  # the scalp is dark of roots
+        skin_table["scalp"] = _rounded(0.9 - 0.45 * hair["grey"], 2)
     return {
         "about": ", ".join(f"{name} {value}" for name, value in about.items()),
         "exposure": exposure(skin_table),
@@ -284,7 +286,7 @@ def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dic
     names = list(_HAIRS)
     odds = [(1 - light) * _HAIRS[n][1] + light * _HAIRS[n][2] for n in names]
     colour = np.array(_HAIRS[_choice(rng, names, odds)][0]) * rng.uniform(0.8, 1.25)
-    grey = float(np.clip((age - rng.normal(45, 7)) / 30, 0, 1))
+    grey = float(np.clip((age - rng.normal(45, 7)) / 30, 0, 0.85))
     table: dict[str, Any] = {
         "colour": [_rounded(v, 4) for v in colour],
         "grey": _rounded(grey, 2),

@@ -170,7 +170,7 @@ class Hair(Parameters):
     )
     grey: float = parameter(0.0, unit="share", low=0.0, high=1.0, source="by eye")
     grey_colour: tuple[float, float, float] = parameter(
-        (0.62, 0.60, 0.56), source="by eye", **_COLOUR
+        (0.46, 0.44, 0.40), source="by eye", **_COLOUR
     )
     lightness: float = parameter(0.28, low=0.0, high=1.5, source="by eye")
     style: Style = nested(Style, default_factory=lambda: Style.read("side_part", "hair.style"))
@@ -208,7 +208,7 @@ class Hair(Parameters):
     )
     brow_length_mm: float = parameter(43.0, unit="mm", low=10.0, high=80.0, source="by eye")
     brow_hair_mm: float = parameter(8.0, unit="mm, longest", low=1.0, high=25.0, source="by eye")
-    brow_light: float = parameter(0.45, unit="of the colour", low=0.1, high=6.0, source="by eye")
+    brow_light: float = parameter(0.35, unit="of the colour", low=0.1, high=6.0, source="by eye")
     stubble: int = parameter(30000, unit="hairs", low=0, high=100000, source="second trial")
     stubble_mm: tuple[float, float] = parameter(
         (0.15, 0.55), unit="mm, shortest and longest", low=0.05, high=40.0, source="a day's beard"

@@ -105,3 +105,59 @@ def test_a_style_that_cannot_be_is_refused(style, message):
     with pytest.raises(ValueError, match="style") as error:
         Style.read(style, "hair.style")
     assert message in str(error.value)
+
+
+def test_a_hair_alone_before_the_face_is_left_out_and_a_bundle_is_not():
+    rng = np.random.default_rng(4)
+    down = np.linspace(0, -60, 12)
+    forward = EYES + [0.0, 10.0, 20.0]
+    strand = forward + np.stack([0 * down, down, 0 * down], axis=1)
+    bundle = strand + [30.0, 0.0, 0.0] + rng.uniform(-1.5, 1.5, (60, 1, 3))
+    behind = strand - [0.0, 0.0, 200.0]
+    curves = np.concatenate([strand[None], bundle, behind[None]])
+    alone = hair.alone_before_the_face(curves, EYES, share=1.0)
+    assert alone[0] and not alone[1:].any()
+
+
+def test_roots_are_denser_beside_a_parting_and_rise_off_it(scalp):
+    plain = {"like": "side_part", "part_dense": 0.0, "part_lift_deg": 0.0}
+    shares, lifts = [], []
+    for style in (plain, "side_part"):
+        own = Hair.read({"style": style}, "hair")
+        points = hair.scalp_hair(scalp, EYES, np.random.default_rng(1), 0.06, own)[0]["points"]
+        roots, way = points[:, 0], points[:, 1] - points[:, 0]
+        away = np.abs(roots[:, 0] - own.style.part_mm)
+        beside = (growth.parting_nearness(own.style, roots, EYES) > 0.9) & (away < 6)
+        out = (roots - [0.0, -100.0, 45.0]) / 92.0
+        rise = (way * out).sum(axis=1) / np.linalg.norm(way, axis=1)
+        shares.append(beside.mean())
+        lifts.append(np.degrees(np.arcsin(rise[beside & (away > 1)])).mean())
+    assert shares[1] > 1.3 * shares[0]
+    assert lifts[1] > lifts[0] + 5
+
+
+def test_brows_differ_fade_at_the_tail_and_follow_what_is_said():
+    """On a plane before two eyes 64 mm apart."""
+    grid = np.linspace(-90, 90, 91)
+    x, y = (values.ravel() for values in np.meshgrid(grid, grid, indexing="ij"))
+    positions = np.column_stack([x, y, np.full(len(x), 100.0)])
+    corner = np.arange(91 * 91).reshape(91, 91)
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    faces = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    normals = np.tile([0.0, 0.0, 1.0], (len(x), 1))
+    plane = hair.Scalp(positions, normals, faces, np.zeros((len(x), len(MASKS))))
+    eyes = np.array([[32.0, 0.0, 90.0], [-32.0, 0.0, 90.0]])
+    for uneven in (0.0, 2.0):
+        own = Hair.read({"brow_uneven": uneven, "brow_fine": 1.0}, "hair")
+        left, right = hair.brows(plane, eyes, np.random.default_rng(2), 600, own)
+        assert len(left["points"]) == 1200, "a fine hair for each"
+        middle = [np.median(brow["points"][:, 0, 1]) for brow in (left, right)]
+        assert (abs(middle[0] - middle[1]) > 0.3) == bool(uneven)
+        u = (left["points"][:, 0, 0] - 32.0 - own.brow_inner_mm) / own.brow_length_mm
+        tail, body = (u > 0.85).sum() / 0.15, ((u > 0.3) & (u < 0.5)).sum() / 0.2
+        assert 0.1 < tail / body < 0.5
+        way = left["points"][:, 1] - left["points"][:, 0]
+        assert np.median(way[u < 0.05, 1]) > 2 * abs(np.median(way[u < 0.05, 0])), "up at the nose"
+        assert np.median(way[u > 0.85, 0]) > 0 > np.median(way[u > 0.85, 1])
+        widths = left["width_mm"]
+        assert np.quantile(widths, 0.9) < 0.12 and np.quantile(widths, 0.1) < 0.04

@@ -38,6 +38,15 @@ def test_a_higher_hairline_bares_the_forehead(bust):
     assert strip.sum() > 20 and high[strip].mean() < 0.15 < 0.9 < usual[strip].mean()
 
 
+def test_the_hairline_fades_across_itself():
+    """Beside a sideburn's steep edge what counts is the way to it, not to the line's height."""
+    regions = Regions(hairline=((0, 60), (60, 60), (60.5, -20), (180, -20)))
+    degrees, up = np.array([50.0, 70.0, 20.0]), np.array([20.0, 20.0, 52.0])
+    within = skin._within_line(degrees, up, regions, 0.0)
+    a_degree = np.radians(skin.HEAD_MM)
+    np.testing.assert_allclose(within, [-10.25 * a_degree, 9.75 * a_degree, -8.0], atol=0.2)
+
+
 def test_a_table_goes_over_the_defaults_place_by_place():
     regions = Regions.read({"oil": {"nose": 1.0}}, "person.regions")
     assert regions.oil["nose"] == 1.0 and regions.oil["forehead"] == Regions().oil["forehead"]

@@ -15,7 +15,7 @@ from renderer.scene.lights import DistantLight
 from renderer.scene.material import Material
 
 
-def stand_of(points, width_mm, back_mm=-200.0):
+def stand_of(points, width_mm, back_mm=-200.0, lamp=3.0):
     """Strands (S, P, 3) of one width before a square of 400 mm, under a lamp along +z: a graph."""
     count = len(points)
     corners = 200.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
@@ -41,7 +41,7 @@ def stand_of(points, width_mm, back_mm=-200.0):
     )
     graph = SceneGraph(Environment((0.1, 0.1, 0.1)), subject=np.zeros(3))
     graph.add_model(Model(surface, (), strands, {}, Material(medium="")), np.eye(4))
-    graph.add_light(DistantLight(direction=(0.0, 0.0, 1.0), irradiance=(3.0, 3.0, 3.0)))
+    graph.add_light(DistantLight(direction=(0.0, 0.0, 1.0), irradiance=(lamp, lamp, lamp)))
     return graph
 
 
@@ -154,3 +154,19 @@ def test_pieces_hold_every_segment_once():
     segments = {tuple(sorted(face)) for face in (faces // 2)[:, [0, 2]]}
     expected = {(k, k + 1) for a, b in pairwise(first) for k in range(a, b - 1)}
     assert segments == expected
+
+
+def test_hair_that_hangs_far_from_its_root_is_lit_from_where_it_hangs():
+    """Under an even sky a root on an open square has all of it, and what hangs 150 mm off 0.8."""
+    y = np.linspace(0, -160, 17)
+    points = np.stack([0 * y, y, 0 * y], axis=1)[None]
+    graph = stand_of(points, 0.07, back_mm=-1.0, lamp=0.0)
+    with renderer.Renderer(graph, (32, 32), 1, rays=64, shadow_map=256) as drawing:
+        (hair,) = drawing.hair
+        seen_from = {"camera_position": np.array([0.0, -80.0, 1e5])}
+        passes = (drawing.context, drawing.program, drawing.lamps, drawing.surroundings)
+        with hair.shade(*passes, seen_from) as target:
+            radiance = target.textures[0].read()[::-1].reshape(-1, 4)[:17, 1]
+    assert radiance[0] == pytest.approx(radiance[3], rel=0.02), "within 40 mm as at the root"
+    assert (np.diff(radiance) < 1e-4).all()
+    assert radiance[-1] == pytest.approx(0.8 * radiance[0], rel=0.05)
