@@ -52,7 +52,7 @@ vec3 iris_colour(vec2 q, float pixel_mm, float seed) {
 void main() {
     vec3 v = normalize(camera_position - world);
     float phase = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
-    float tissue = a.x, caruncle = a.y, pixel_mm = footprint_mm() / size;
+    float tissue = a.x, sheet = min(4.0 * tissue, 1.0), caruncle = a.y, pixel_mm = footprint_mm() / size;
     vec3 up = normalize(vec3(0.0, 1.0, 0.0) - gaze * gaze.y), side = cross(up, gaze);
     mat3 frame = mat3(side, up, gaze);                  // of the gaze to the world
     vec3 own = (world - centre) / size, p = own * frame;  // mm from the centre, in the world's axes and in the gaze's
@@ -67,7 +67,7 @@ void main() {
     // how far the lids' edges are, and their shade
     vec2 edge = has_edges == 1 ? to_edges(edges, edges_mm, front.xy) : vec2(20.0);
     float over = 0.5 * lid_shade * exp(-max(edge.y, 0.0) / (0.4 * lid_shade_mm));
-    float corner = 0.45 * lid_shade * (1.0 - tissue) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 3.0);
+    float corner = 0.45 * lid_shade * (1.0 - sheet) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 3.0);
 
     // iris, seen through the cornea
     vec3 q = to_iris(p, n * frame, -v * frame);
@@ -98,9 +98,9 @@ void main() {
     float ring = exp(-pow(from / ((from < 0.0 ? wide : 1.35 * wide) * limbus_mm), 2.0)) * step(0.0, p.z);
     albedo *= 1.0 - min(limbus * dark, 0.95) * ring * vec3(1.0, 0.98, 0.92);
     // light that ends on the iris came in higher on the cornea, nearer to the lid and its lashes; the ball's sides turn away from it
-    float behind = 1.0 - max(white, tissue);
+    float behind = 1.0 - max(white, sheet);
     float under = min(lid_shade * (1.0 + 0.30 * behind), 1.0) * exp(-max(edge.x - 0.9 * behind, 0.0) / lid_shade_mm);
-    float sides = 0.35 * lid_shade * (1.0 - tissue) * smoothstep(0.55, 1.25, angle);
+    float sides = 0.35 * lid_shade * (1.0 - sheet) * smoothstep(0.55, 1.25, angle);
     vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner) * (1.0 - sides)), vec3(0.90, 1.06, 1.12));  // lids send back red light
     // the corner: the fold is pink, the caruncle redder and dull
     vec3 flesh = mix(vec3(0.58, 0.33, 0.30), vec3(0.60, 0.31, 0.26), caruncle) * (1.0 + 0.16 * fbm(solid / 0.55) - 0.10 * fbm(solid / 0.25));
@@ -108,10 +108,12 @@ void main() {
 
     // tears: thin everywhere, with a meniscus along the lids where the normal swings away from them
     vec3 wet_n = n;
+    float wet = 0.0;
     if (has_edges == 1 && meniscus_mm > 0.0) {
         for (int k = 0; k < 2; ++k) {
             float d = k == 0 ? edge.x : edge.y, tall = k == 0 ? 0.6 * meniscus_mm : meniscus_mm * max(1.0 + 0.5 * noise(solid / 1.3) + 0.4 * noise(solid / 0.5), 0.1);
             float t = 1.0 - clamp(d / tall, 0.0, 1.0);
+            wet = max(wet, t);
             vec2 away = away_from_edge(edges, edges_mm, front.xy, k);
             wet_n = normalize(wet_n + mat3(model) * vec3(away, 0.15) / size * (1.9 * t * t));
         }
@@ -137,9 +139,9 @@ void main() {
         float on_iris = through_cornea(qn, l * frame);
         float on_white = smoothstep(-0.25, 1.0, dot(n, l));  // light wraps: the sclera scatters
         irradiance += light_here * seen * mix(on_iris, on_white, max(white, tissue));
-        specular += seen * mirror * lamp_mirrored(k, world, r, mix(SMOOTH.x, SMOOTH.y, max(white, tissue)));
+        specular += seen * mirror * lamp_mirrored(k, world, r, mix(SMOOTH.x, SMOOTH.y, max(white, tissue) * (1.0 - 0.7 * wet)));
     }
-    irradiance *= shade * (1.0 + 0.5 * tissue);  // light comes to the corner through the lids about it too
+    irradiance *= shade * (1.0 + 0.5 * sheet);  // light comes to the corner through the lids about it too
     // what is around, mirrored; the upper lid and its lashes stand before it
     float free = smoothstep(0.12, 0.55, open_sky) * smoothstep(-0.3, 1.6, edge.x) * (1.0 - 0.8 * tissue);
     specular += environment(r, 1500.0) * mirror * free;

@@ -10,7 +10,7 @@ void to_margin(vec3 local, vec3 solid, inout vec3 albedo, inout float m) {
     float roots = exp(-pow((from - mix(1.10, 0.40, upper)) / mix(0.45, 0.50, upper), 2.0));
     albedo *= 1.0 - min(lash_line * mix(0.7, 2.2, upper), 0.85) * vec3(0.88, 1.0, 1.0) * roots;
     // where it goes over into the lid's skin it is redder still
-    albedo *= mix(vec3(1.0), vec3(0.97, 0.86, 0.85), (1.0 - smoothstep(0.6, 3.5, from)) * (1.0 - upper));
+    albedo *= mix(vec3(1.0), vec3(0.985, 0.93, 0.92), (1.0 - smoothstep(0.6, 3.5, from)) * (1.0 - upper));
     vec3 mucosa = mix(albedo * vec3(0.98, 0.70, 0.68), lid_margin, 0.30);
     albedo = mix(albedo, mucosa * mix(1.0, 0.55, upper), margin);
     m = mix(m, mix(0.20, 0.35, upper), margin);

@@ -25,10 +25,13 @@ STEP_MM = 0.15  # of the rays that an opening is measured with
 BEHIND_MM = 3.0  # so far behind the ball's front a ray has to come for it to have gone between lids
 CONTACT = 0.94  # of the base mesh's ball: where its lids' edges lie
 LEAVES = -0.5  # of the radius: there edges leave the ball towards the inner corner
-CORNER_MM = 1.2  # that the inner corner is set back
-EASED_MM, EASED_ROUNDS = 9.0, 40  # about the inner corner, where skin is smoothed, and how often
+CORNER_MM = 0.5  # that the inner corner is set back
+#: Where skin about the inner corner is smoothed: (x, y) mm from the corner, fully within a radius,
+#: not beyond another, how often. Below the corner folds are pushed together, beside it the nose's
+#: wall.
+EASED = (((-1.5, -3.0), 3.5, 9.0, 40), ((-5.0, 1.5), 3.5, 9.5, 320))
 CLEAR_MM = 0.05  # of skin from the ball
-LATERAL_MM = 0.5  # of the outer corner from the ball's side
+LATERAL_MM = 0.8  # of the outer corner from the ball's side
 UPPER_SHARE = 0.62  # of the opening's height, above the line between the corners
 UPPER, LOWER = (1.05, 1.0), (1.25, 0.95)  # powers of the distance from either corner, nose first
 CREASE_SOFT_MM, CREASE_HALF_MM = 1.0, 0.4  # over which the fold rises; half the crease's width
@@ -196,7 +199,7 @@ class _Shape:
         for old, new in zip(self._old_edges(across), self.goal(across), strict=True):
             flat = across**2 + (new - self.line) ** 2
             places.append(old - np.sqrt(np.maximum(own.radius_mm**2 - flat, 0)))
-        self.centre = np.array([0.0, self.line, np.mean(places)])
+        self.centre = np.array([0.0, self.line, np.mean(places) + own.forward_mm])
 
     def _place(self, new_x: np.ndarray) -> np.ndarray:
         """Where along the measured opening what is wanted at new_x was: x (N,)."""
@@ -228,7 +231,7 @@ class _Shape:
         ):
             flat = x**2 + (new - self.line) ** 2
             deep = self.centre[2] + np.sqrt(np.maximum(self.own.radius_mm**2 - flat, 0))
-            deep = (1 - share) * deep + share * (first - CORNER_MM)
+            deep = (1 - share) * deep + share * (first - CORNER_MM + 0.5 * self.own.forward_mm)
             moves.append(deep - old)
         return moves[0], moves[1]
 
@@ -345,15 +348,23 @@ def _eased(points: np.ndarray, faces: np.ndarray, shape: _Shape) -> np.ndarray:
     """Points (N, 3) with the skin beside and below the inner corner smoothed: folds of the base
     mesh are pushed together there.
     """
-    from scipy import sparse
-
     local = (points - shape.ball.centre) * [shape.side, 1, 1]
     low, high = shape.goal(local[:, 0])
     above = np.maximum(local[:, 1] + shape.line - high, low - local[:, 1] - shape.line)
     away = np.maximum(above, shape.medial - local[:, 0])  # from the opening
-    middle = np.array([shape.medial - 1.5, shape.corners[0] - shape.line - 3.0])
-    share = 1 - _step(3.5, EASED_MM, np.linalg.norm(local[:, :2] - middle, axis=1))
-    share *= _step(1.0, 2.2, away) * (local[:, 2] > 0)
+    corner = np.array([shape.medial, shape.corners[0] - shape.line])
+    result = points.copy()
+    for offset, full, none, rounds in EASED:
+        share = 1 - _step(full, none, np.linalg.norm(local[:, :2] - corner - offset, axis=1))
+        share *= _step(1.0, 2.2, away) * (local[:, 2] > 0)
+        result = _smoothed(result, faces, share, rounds)
+    return result
+
+
+def _smoothed(points: np.ndarray, faces: np.ndarray, share: np.ndarray, rounds: int) -> np.ndarray:
+    """Points (N, 3) drawn to their neighbours' mean `rounds` times, by share (N,) in [0, 1]."""
+    from scipy import sparse
+
     own = np.flatnonzero((share[faces] > 0).any(axis=1))
     used, part = np.unique(faces[own], return_inverse=True)
     part = part.reshape(-1, 3)
@@ -362,7 +373,7 @@ def _eased(points: np.ndarray, faces: np.ndarray, shape: _Shape) -> np.ndarray:
     link = sparse.csr_matrix((ones, (np.append(i, j), np.append(j, i))), (len(used), len(used)))
     link = sparse.diags(1 / np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)) @ link
     moved, weight = points[used].copy(), 0.6 * share[used, None]
-    for _ in range(EASED_ROUNDS):
+    for _ in range(rounds):
         moved += weight * (link @ moved - moved)
     result = points.copy()
     result[used] = moved

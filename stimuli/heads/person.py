@@ -98,6 +98,13 @@ class Eyes(Parameters):
     lid_thickness: float = parameter(
         0.44, unit="of the base mesh's 3.3 mm", low=0.3, high=1.5, source="by eye; adults 2 mm"
     )
+    forward_mm: float = parameter(
+        1.2,
+        unit="mm, ball and lids before the base mesh's",
+        low=-4.0,
+        high=5.0,
+        source="by eye: deep-set eyes lie in the brow's shade",
+    )
     crease_mm: float = parameter(
         2.8,
         unit="mm above the upper edge, as far as that shows",

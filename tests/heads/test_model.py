@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 import renderer
 from renderer.scene import MASKS, Environment, Eye, cornea
@@ -126,6 +127,16 @@ def test_eyes_have_the_size_of_eyes_and_lids_that_fit(anatomy, model):
         distance = np.linalg.norm(away, axis=1)
         front = cornea.reach(away @ own.direction / distance, ball.radius, own.iris_mm)
         assert (distance > front).all()
+        # beside the inner corner the nose's wall is no cliff that would hide it from beside
+        side = np.sign(ball.centre[0])
+        inner = side * opening.x[0 if side > 0 else -1]
+        x = np.arange(inner - 9, inner - 1.5, 0.5)
+        start = np.column_stack([side * x, np.full(len(x), -1.0), np.full(len(x), 60.0)])
+        mesh = trimesh.Trimesh(away, anatomy.fine.faces, process=False)
+        face = mesh.ray.intersects_first(start, np.tile([0.0, 0.0, -1.0], (len(x), 1)))
+        n = mesh.face_normals[face]
+        z = start[:, 2] + ((mesh.triangles[face, 0] - start) * n).sum(axis=1) / n[:, 2]
+        assert (face >= 0).all() and np.abs(np.diff(z) / 0.5).max() < 2.2
         # the corner's tissue lies behind the lids' corner and reaches the ball
         sheet = eye.positions[eye.tissue[:, 0] > 0] - ball.centre
         side = np.sign(ball.centre[0])
