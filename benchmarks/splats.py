@@ -57,6 +57,7 @@ FAR = {"very close": 16.5, "moderate": 28.8, "far": 78.2}  # table 6.7, 50 x 49 
 HEIGHTS = {"very close": 34.0, "moderate": 48.0, "far": 90.0}
 NUMBER_EVEN = (5789, 6947, 8105, 9263)
 FPS_EVEN = (16.7, 13.1, 11.1, 9.4)
+TABLES = ("5.4", "6.1", *OTHERS, "6.6", "6.7", "6.8")
 
 
 def knot(height_mm: float, medium: str) -> dict:
@@ -125,20 +126,37 @@ def numbers(frame, number: str, grids, published: dict, rounds: int, medium="mar
     print(f"\nmultipole over dipole: {ratio:.2f}; published {paper:.2f}", flush=True)
 
 
-def frames(size: int, rounds: int) -> None:
-    """The tables of a frame's cost."""
-    drawing, frame = frame_of(34.0, size)
-    grid = {"samples": "lights"}
-    numbers(frame, "6.1", GRIDS, NUMBER, rounds)
-    made = {f"{s:g}": smaller("multipole", s, grid=(75, 32), **grid) for s in SIZES}
-    got = spent(frame, made, rounds)
-    rows = [(f"{s:g}", got[f"{s:g}"], fps) for s, fps in SIZES.items()]
-    table("splat size, share of the radius (table 6.6, 75 x 32)", rows)
+def frames(size: int, rounds: int, wanted: set[str]) -> None:
+    """The tables of a frame's cost, those of `TABLES` that are wanted."""
+    if wanted & {"6.1", "6.6", "6.8"}:
+        drawing, frame = frame_of(34.0, size)
+        if "6.1" in wanted:
+            numbers(frame, "6.1", GRIDS, NUMBER, rounds)
+        if "6.6" in wanted:
+            grid = {"grid": (75, 32), "samples": "lights"}
+            made = {f"{s:g}": smaller("multipole", s, **grid) for s in SIZES}
+            got = spent(frame, made, rounds)
+            rows = [(f"{s:g}", got[f"{s:g}"], fps) for s, fps in SIZES.items()]
+            table("splat size, share of the radius (table 6.6, 75 x 32)", rows)
+        if "6.8" in wanted:
+            over_surface(frame, rounds)
+        frame.close()
+        drawing.close()
+    for number, (medium, grids, published) in OTHERS.items():
+        if number in wanted:
+            drawing, frame = frame_of(34.0, size, medium)
+            numbers(frame, number, grids, published, rounds, medium)
+            frame.close()
+            drawing.close()
+    if "6.7" in wanted:
+        distance(size, rounds)
+
+
+def over_surface(frame, rounds: int) -> None:
+    """Table 6.8: the size and the number of splats of points over the surface."""
     area = Body(frame.inputs(None).room.surfaces, 0).mesh.areas.sum()
-    even = {
-        f"{s:g}": smaller("multipole", s, spacing_mm=float(np.sqrt(area / NUMBER_EVEN[0])))
-        for s in EVEN
-    }
+    spacing_mm = float(np.sqrt(area / NUMBER_EVEN[0]))
+    even = {f"{s:g}": smaller("multipole", s, spacing_mm=spacing_mm) for s in EVEN}
     got = spent(frame, even, rounds)
     rows = [(f"{s:g}", got[f"{s:g}"], fps) for s, fps in EVEN.items()]
     table("over the surface, splat size (table 6.8, 5,789 splats)", rows)
@@ -146,18 +164,15 @@ def frames(size: int, rounds: int) -> None:
     got = spent(frame, more, rounds)
     rows = [(n, s, fps) for (n, s), fps in zip(got.items(), FPS_EVEN, strict=True)]
     table("over the surface, number of splats (table 6.8)", rows)
-    frame.close()
-    drawing.close()
-    for number, (medium, grids, published) in OTHERS.items():
-        drawing, frame = frame_of(34.0, size, medium)
-        numbers(frame, number, grids, published, rounds, medium)
-        frame.close()
-        drawing.close()
+
+
+def distance(size: int, rounds: int) -> None:
+    """Table 6.7: the pixels that the object covers."""
     rows, covered = [], []
     for name, fps in FAR.items():
         drawing, frame = frame_of(HEIGHTS[name], size)
         covered.append(int((frame.surface.textures[3].read()[..., 0] > 0).sum()))
-        one = {name: splat("multipole", grid=(50, 49), **grid)}
+        one = {name: splat("multipole", grid=(50, 49), samples="lights")}
         rows.append((name, spent(frame, one, rounds)[name], fps))
         frame.close()
         drawing.close()
@@ -187,9 +202,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--size", type=int, default=512, help="pixels of a side")
     parser.add_argument("--rounds", type=int, default=3, help="of each, medians")
+    parser.add_argument("--table", action="append", choices=TABLES, help="these alone; repeat")
     given = parser.parse_args()
-    relaxation()
-    frames(given.size, given.rounds)
+    wanted = set(given.table or TABLES)
+    if "5.4" in wanted:
+        relaxation()
+    frames(given.size, given.rounds, wanted)
 
 
 if __name__ == "__main__":

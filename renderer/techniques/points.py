@@ -224,7 +224,7 @@ class PointsTechnique(Technique):
     def _one(self, inputs: Inputs, room: Room, parts: tuple[Drawn, ...], sums: gl.Target) -> None:
         """Add one body's points to the sums."""
         body = Body(parts, self.seed)
-        with gl.Target(inputs.width, inputs.height, [GL.GL_RGBA16F], depth=room.depth()) as seen:
+        with gl.Target(inputs.width, inputs.height, [GL.GL_RGBA32F], depth=room.depth()) as seen:
             seen.bind(clear=(0.0, 0.0, 0.0, 0.0))
             seen.bind(depth_test=True)
             GL.glDepthMask(False)
@@ -232,7 +232,9 @@ class PointsTechnique(Technique):
                 "techniques/splat_seen.frag", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert"
             )
             for drawn in parts:
-                program.use(**program.accepts({**room.camera, "model": drawn.item.pose}))
+                own = {"depths": inputs.depths, "irradiance": inputs.irradiance}
+                own |= {**room.camera, "model": drawn.item.pose}
+                program.use(**program.accepts(own))
                 drawn.mesh.draw()
             for samples, light in self._samples(room, body):
                 tables = self.tables(inputs.curve, room.value, samples.spacing_mm)
@@ -300,7 +302,6 @@ class PointsTechnique(Technique):
                     normals=normals,
                     about=about,
                     depths=inputs.depths,
-                    irradiance=inputs.irradiance,
                     seen=seen.textures[0],
                     near_table=textures.near,
                     far_table=textures.far,
