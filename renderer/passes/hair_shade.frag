@@ -8,6 +8,7 @@ uniform sampler2D places; uniform sampler2D tangents; uniform sampler2D covers;
 uniform sampler2D colours;       // a strand's: rgb: what two ways through the fibre leave of light
 uniform sampler2D environments;  // a strand's: light from everywhere on the skin at the root; w: its first point
 uniform sampler2DArray lit_map;  // (passes/hair_lit.frag)
+uniform float sheen;             // share of R that is mirrored as by whole scales
 uniform vec2 leaves;             // mm from the root: hair that hangs far from it is lit from where it is
 uniform float extinction;        // of the whole layer along its normal
 uniform float tilt;              // of the cuticle's scales, radians
@@ -25,7 +26,7 @@ vec3 fibre(vec3 t, vec3 l, vec3 v, vec3 colour, float f0) {
     float cd = max(cos(0.5 * (asin(so) - asin(si))), 0.2), sum = si + so;
     float cp = clamp(dot(l - si * t, v - so * t) / (ci * co), -1.0, 1.0), ch = sqrt(0.5 + 0.5 * cp);
     // R: mirrored by scales that lean to the tip, so its highlight lies nearer the root
-    vec3 s = vec3(0.25 * ch * schlick(f0, sqrt(clamp(0.5 + 0.5 * dot(l, v), 0.0, 1.0))) * lobe(sum + 2.0 * tilt, 2.0 * spread));
+    vec3 s = vec3(0.25 * sheen * ch * schlick(f0, sqrt(clamp(0.5 + 0.5 * dot(l, v), 0.0, 1.0))) * lobe(sum + 2.0 * tilt, 2.0 * spread));
     float bent = 1.19 / cd + 0.36 * cd, a = 1.0 / bent;
     float h = ch * (1.0 + a * (0.6 - 0.8 * cp));
     float f = schlick(f0, cd * sqrt(clamp(1.0 - h * h, 0.0, 1.0)));
