@@ -932,6 +932,34 @@ def test_triplets_on_a_large_screen_a_phone_and_at_twice_the_zoom(
     assert [row.device_pixel_ratio for row in rows] == [ratio for *_, ratio in screens]
 
 
+def test_answers_stand_below_the_middle_of_the_pair_and_a_reason_takes_a_line_of_its_own(
+    chromium, tmp_path, write_study
+):
+    """No side's answers are nearer to their image; opened at 200 %, the reason took the answers'
+    place.
+    """
+    reason = {"share": 1.0, "text": "Why?", "ticks": ["shadows"], "free": True}
+    app = create_app(write_study(tmp_path / "study", size=(320, 180), reason=reason))
+    with running(app) as address:
+        for width, height, ratio in [(1920, 1080, 1), (1280, 720, 1), (640, 360, 2)]:
+            screen = {"viewport": {"width": width, "height": height}, "device_scale_factor": ratio}
+            with chromium.new_context(**screen, locale="en-GB") as context:
+                page = context.new_page()
+                begin(page, address)
+                page.click(".reason > summary")
+                box = page.locator("fieldset.scale").bounding_box()
+                if width > 1000:
+                    assert box["x"] + box["width"] / 2 == pytest.approx(width / 2, abs=1)
+                assert box["width"] > 0.59 * width
+                assert page.locator(".reason").bounding_box()["y"] > box["y"] + box["height"] - 1
+                confirm = page.locator(".confirm button").bounding_box()
+                assert confirm["x"] >= box["x"] + box["width"]
+                assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+                page.click("details.help >> nth=0 >> summary")
+                assert "Enter" in page.inner_text("details.help >> nth=0")
+                assert "Tap" not in page.inner_text("details.help >> nth=0")
+
+
 def test_inspect_shows_a_study_without_a_server(study_dir, page):
     from app.cli import main
 
@@ -950,3 +978,9 @@ def test_inspect_shows_a_study_without_a_server(study_dir, page):
     assert page.evaluate("document.querySelector('[data-map]').naturalWidth") == 960
     page.locator("button[data-show]").last.click()
     assert page.locator("select[data-cell]").input_value() == "half-length"
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    colours = "getComputedStyle(document.querySelector('select[data-cell]'))"
+    assert page.evaluate(f"{colours}.color") != page.evaluate(f"{colours}.backgroundColor")
+    tallest = "Math.max(...[...document.querySelectorAll('.found tr')].map(r => r.offsetHeight))"
+    assert page.evaluate(tallest) < 60  # names that broke after each letter took 400
