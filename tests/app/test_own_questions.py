@@ -36,7 +36,8 @@ def study_dir(tmp_path, write_study):
 def test_the_whole_of_it_in_its_order(app, person):
     somebody = person()
     text = somebody.get("/").text
-    assert "your answers to 3 other questions; and the reasons that you give" in text
+    assert "<li>your answers to 3 other questions</li>" in text
+    assert "<li>the reasons that you give for a choice</li>" in text
     somebody.send("consent", consent="yes")
     somebody.send("familiarity", familiarity=3)
     assert somebody.path == "/before"
