@@ -295,7 +295,7 @@ def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dic
         "brow_half_mm": _rounded(rng.normal(4.3 if sex == "male" else 3.2, 0.4), 2),
         "stubble": int(rng.uniform(8000, 40000)) if sex == "male" else 0,
     }
-    pale = 1 - tone
+    pale = (1 - tone) ** 2
     table["vellus_colour"] = [
         _rounded(v, 4) for v in (0.02 + 0.20 * pale, 0.014 + 0.136 * pale, 0.010 + 0.09 * pale)
     ]
