@@ -42,7 +42,7 @@ def portraits(
     import renderer
 
     chosen = renderer.make(technique)
-    tables = [with_head(merge(load_table(scene), patch), name) for name in names]
+    tables = [merge(with_head(load_table(scene), name), patch) for name in names]
     scenes = [read_scene(table) for table in tables]
     for name, definition in zip(names, scenes, strict=True):
         staged = stage(definition, seed)

@@ -115,6 +115,17 @@ def test_analyse_takes_one_thread_of_blas_unless_told_otherwise():
         ["render", "--technique", "none", "--framing", "no", "--size", "64x64", "--out", "a.png"],
         [
             "render",
+            "-t",
+            "none",
+            "--identity",
+            "woman",
+            "--set",
+            "objects.head.no=1",
+            "-o",
+            "a.png",
+        ],
+        [
+            "render",
             "--technique",
             "none",
             "--framing",

@@ -124,12 +124,12 @@ def command(
     chosen = renderer.make(technique, parameters)
     if (workers or cluster) and technique != "reference":
         raise click.UsageError(f"{technique} is drawn by this process; expected no workers")
-    table = merge(load_table(scene), patches)
+    table = merge(with_head(load_table(scene), head, said), patches)
     if framing:
         if framing not in (known := framings(table)):
             raise InputError(f"no framing {framing!r}; expected one of {', '.join(known)}")
         table = merge(table, {"camera": {"framing": framing}})
-    definition = read_scene(with_head(table, head, said))
+    definition = read_scene(table)
     _writable(out, (".png",))
     if samples:
         _writable(samples, (".npy",))

@@ -127,7 +127,7 @@ class SceneGraph(pyrender.Scene):
             cloth = SurfaceMaterial(garment.material, garment.surface.maps)
             parts.append(SurfacePrimitive(garment.surface, cloth, {}))
         parts += [EyePrimitive(eye) for eye in model.eyes]
-        if model.strands is not None:
+        if model.strands is not None and len(model.strands.points):
             parts.append(StrandPrimitive(model.strands))
         self.add(pyrender.Mesh(parts, name=name), pose=pose)
 

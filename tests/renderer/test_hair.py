@@ -62,6 +62,13 @@ def test_what_a_thin_strand_covers_is_its_width_at_every_distance():
                 assert covered == pytest.approx(width * length, rel=0.09), (width, height)
 
 
+def test_a_model_of_no_strands_is_one_without_hair():
+    with renderer.Renderer(stand_of(np.zeros((0, 2, 3)), 0.1), (32, 24), 1, 0, 4, 256) as drawing:
+        camera = Camera(height_mm=60.0, yaw_deg=0.0, pitch_deg=0.0)
+        with drawing.frame(camera) as frame:
+            assert (frame.render(renderer.make("none")).image > 0).any()
+
+
 def test_strands_shade_those_behind_them_by_what_they_cover():
     """Light through sheets of parallel strands: each takes width / spacing of it; between the four
     depths of the map it is blended, so that it may be off by half a sheet.
