@@ -120,6 +120,11 @@ def opened(name: str, key: str) -> np.lib.npyio.NpzFile | None:
         return None
 
 
+def there(name: str, key: str) -> bool:
+    """Whether the cache `name` has a file of a key, whole or not."""
+    return bool(limit_bytes()) and (folder() / name / f"{key}.npz").is_file()
+
+
 def keep(name: str, key: str, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
     """Keep arrays that are written as they are made, so that not all are in memory at once.
 

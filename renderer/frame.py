@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from renderer import gl, kept
+from renderer import caches, gl, kept
 from renderer.gl import GL
 from renderer.memory import give_back
 from renderer.optics.transmittance import Translucency
@@ -71,6 +71,9 @@ class Frame:
             "projection": view.projection,
         }
         renderer.surfaces.look(view.eye)
+        name = self._name("surfaces")
+        if name is None or not caches.there("views", name):
+            renderer.light_up()  # before the buffers take their memory
         self.surface = gl.Target(self.width, self.height, list(FORMATS), depth=True)
         self._deep = False  # whether the depth buffer holds the surfaces
         if not self._read("surfaces", self.surface):

@@ -107,7 +107,6 @@ class Renderer:
         """Whether anything in the scene has strands."""
         return bool(self._contents.strands)
 
-    @cached_property
     def _everything(self) -> np.ndarray:
         """All points (N, 3) of the scene, mm."""
         return np.vstack([self.surfaces.vertices(), *(hair.points for hair in self.hair)])
@@ -118,7 +117,8 @@ class Renderer:
         own = getattr(self.scene, "subject", None)
         if own is not None:
             return np.asarray(own, float)
-        return 0.5 * (self._everything.min(axis=0) + self._everything.max(axis=0))
+        points = self._everything()
+        return 0.5 * (points.min(axis=0) + points.max(axis=0))
 
     @cached_property
     def lamps(self) -> Lamps:
@@ -126,7 +126,7 @@ class Renderer:
         they are kept: ask before a target is bound, by `light_up`.
         """
         strands = np.vstack([np.empty((0, 3)), *(hair.casting(LEAST_MM) for hair in self.hair)])
-        lamps = Lamps(self._contents.lights, self._everything, strands, self._shadow_map)
+        lamps = Lamps(self._contents.lights, self._everything(), strands, self._shadow_map)
         if self.kept_as and kept.load_shadows(self.kept_as, lamps, self.hair):
             return lamps
         lamps.draw(self.program, self.surfaces, self.hair)

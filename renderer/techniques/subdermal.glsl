@@ -11,6 +11,7 @@ uniform vec3 shape;            // 1 / d per channel, 1/mm
 uniform float pixels_per_mm;
 uniform float filter_radius_mm;
 uniform float levels;          // of the pyramid
+uniform int sizes;             // of means, each a SMALLER-th of the last, that are tried before one pixel
 uniform float whole;           // the least share of a mean that the guard has to let in
 uniform float jitter;          // 1: a rotation a block at random, 0: the same for all pixels
 uniform float turn;            // of this frame, in turns
@@ -20,6 +21,7 @@ layout(location = 1) out vec4 count;
 
 // A mean over a texel spreads what it stands for by half its squared side: box and tent, along both axes (renderer/optics/rings.py).
 const float TEXEL_VARIANCE = 0.5;
+const float SMALLER = 3.0;
 const float LOST = 1.0;        // pixels of each row of a mean that may be missing; a step of depth takes two
 const float STEEPEST = 8.0;    // slope of depth; what is steeper is a silhouette
 
@@ -53,12 +55,18 @@ void main() {
     for (int k = first + 1; k < first + int(tile.y); ++k) {
         vec4 tap = texelFetch(taps, ivec2(k, row), 0);
         float phi = tap.y + start, texel_mm = pixel_mm * clamp(tap.z * foreshortened * scale, 1.0, exp2(levels));
-        vec2 towards = scale * vec2(cos(phi), sin(phi));
-        // what another side than the fitted one spreads more or less by comes off the radius or on it
-        float squared = tap.x * tap.x + TEXEL_VARIANCE * (tap.z * tap.z - texel_mm * texel_mm);
-        vec2 there = gl_FragCoord.xy + sqrt(max(squared, 0.04 * tap.x * tap.x)) * towards;
-        vec4 mean = textureLod(guarded, there / size, log2(texel_mm * scale));
-        bool averaged = mean.a >= max(whole, 1.0 - LOST / (texel_mm * scale));
+        vec2 towards = scale * vec2(cos(phi), sin(phi)), there;
+        vec4 mean;
+        bool averaged = false;
+        for (int j = 0; j < sizes; ++j) {
+            if (averaged) continue;
+            // what another side than the fitted one spreads more or less by comes off the radius or on it
+            float squared = tap.x * tap.x + TEXEL_VARIANCE * (tap.z * tap.z - texel_mm * texel_mm);
+            there = gl_FragCoord.xy + sqrt(max(squared, 0.04 * tap.x * tap.x)) * towards;
+            mean = textureLod(guarded, there / size, log2(texel_mm * scale));
+            averaged = mean.a >= max(whole, 1.0 - LOST / (texel_mm * scale));
+            texel_mm = max(texel_mm / SMALLER, pixel_mm);
+        }
         if (!averaged) {
             float single = tap.x * tap.x + TEXEL_VARIANCE * max(tap.z * tap.z - pixel_mm * pixel_mm, 0.0);
             there = gl_FragCoord.xy + sqrt(single) * towards;

@@ -92,6 +92,13 @@ class Subdermal(BurleyFilter):
         high=1.0,
         source="docs/subdermal.md",
     )
+    sizes: int = parameter(
+        1,
+        unit="means of falling size that are tried before a pixel",
+        low=1,
+        high=6,
+        source="docs/subdermal.md",
+    )
     pyramid: bool = parameter(True, source="taps are means; false: single pixels")
     blocks: bool = parameter(True, source="the pixels of an output pixel share a rotation")
 
@@ -182,6 +189,7 @@ class Subdermal(BurleyFilter):
                     filter_radius_mm=self.filter_radius_mm(inputs.curve),
                     levels=float(LEVELS if self.pyramid else 0),
                     whole=self.whole,
+                    sizes=self.sizes,
                     block=inputs.supersample if self.blocks else 1,
                 )
             finally:

@@ -22,7 +22,8 @@ from analysis.files import replacing
 from stimuli import sources
 from stimuli.compare import chosen as chosen
 from stimuli.compare import framed, pooled
-from stimuli.scenes import load_table, merge
+from stimuli.drawing import own_files
+from stimuli.scenes import load_table, merge, read_scene
 
 #: Maps (H, W) of the difference of two images (H, W, 3) in [0, 1], sRGB, the converged first.
 Distances = Mapping[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]
@@ -133,9 +134,12 @@ def drawn(frame, technique) -> tuple[np.ndarray, np.ndarray]:
 
 
 def drawn_from(table: dict, framing: str, technique, options) -> dict:
-    """All that a picture depends on: its scene, view, technique, size, seed and source code."""
+    """All that a picture depends on: its scene with the person and the user's files in it, view,
+    technique, size, seed and source code.
+    """
     return {
         "scene": table,
+        "files": own_files(read_scene(table)),
         "framing": framing,
         "technique": [technique.name, technique.parameters()],
         "drawn": [options.size, options.supersample, options.seed],

@@ -217,3 +217,19 @@ def test_the_busiest_window_is_where_the_most_is():
 def test_a_bad_grid_is_one_line(ball, tmp_path, more, words, capsys):
     assert chapter(ball, tmp_path / "out", *more) == 2
     assert words in capsys.readouterr().err
+
+
+def test_a_kept_picture_follows_the_files_in_its_scene(tmp_path):
+    """A mesh or a person that was changed under the same name is another picture."""
+    file = tmp_path / "thing.obj"
+    table = {
+        "objects": {"thing": {"shape": "mesh", "file": str(file)}},
+        "lights": {"sun": {"direction": [0.0, 0.0, 1.0], "irradiance": [3.0, 3.0, 3.0]}},
+        "camera": {"framing": "head-shot"},
+    }
+    options, names = experiment.Options(), []
+    for text in ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n"):
+        file.write_text(text)
+        (technique,) = experiment.chosen(["golubev"]).values()
+        names.append(experiment.cached(table, "head-shot", technique, options))
+    assert names[0] != names[1]
