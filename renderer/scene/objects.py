@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -58,12 +58,15 @@ class Object(Parameters):
 
 @dataclass(frozen=True)
 class Person(Object):
-    """A head to mid-chest, generated from a named set of parameters (stimuli/people)."""
+    """A head to mid-chest, generated from a named set of parameters (stimuli/people); `expression`
+    goes over the person's own table of that name.
+    """
 
     shape: ClassVar[str] = "person"
 
     person: str = parameter("man", source="stimuli/people")
     dressed: bool = parameter(False, source="the thesis's people are bare")
+    expression: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from renderer.scene import Model
 from renderer.scene.objects import Scan
@@ -23,19 +25,28 @@ class Head:
     notes: tuple[str, ...] = ()  # what the user should be told, one line each
 
 
-def load_person(name_or_path: str = "man", seed: int = 0, dressed: bool = True) -> Head:
+def load_person(
+    name_or_path: str = "man",
+    seed: int = 0,
+    dressed: bool = True,
+    expression: Mapping[str, Any] | None = None,
+) -> Head:
     """A generated person: one of stimuli/people by name, a TOML file of one's own, or a seed.
 
-    seed: of the generated hair; dressed: in the person's clothes, if any. The base data
-    are fetched on first use. Raises stimuli.errors.InputError for a person that cannot be made, and
-    without network and cache.
+    seed: of the generated hair; dressed: in the person's clothes, if any; expression: what goes
+    over the person's own (stimuli.heads.expression). The base data are fetched on first use.
+    Raises stimuli.errors.InputError for a person that cannot be made, and without network and
+    cache.
     """
     from stimuli.heads import fetch
     from stimuli.heads.kept import person_model
     from stimuli.heads.person import Person
 
     name = Path(name_or_path).stem
-    person = Person.read(person_table(name_or_path), name)
+    table = person_table(name_or_path)
+    if expression:
+        table = {**table, "expression": {**table.get("expression", {}), **expression}}
+    person = Person.read(table, name)
     if not dressed:
         person = replace(person, clothes=replace(person.clothes, kind="none"))
     origin = {

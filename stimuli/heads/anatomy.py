@@ -87,6 +87,7 @@ def build_anatomy(data: Path, person: Person, levels: int = LEVELS) -> Anatomy:
     base = mpfb.read_base(data)
     plain = mpfb.lower_arms(data, base, base.positions, person.arm_drop_deg) * mpfb.MM_PER_UNIT
     shaped = mpfb.morph(data, base.positions, person.targets)
+    shaped = person.expression.shown(data, base.positions, shaped)
     shaped = mpfb.lower_arms(data, base, shaped, person.arm_drop_deg)
     shaped = mpfb.turn_torso(data, base, shaped, person.torso_yaw_deg, person.torso_roll_deg)
     shaped = shaped * mpfb.MM_PER_UNIT

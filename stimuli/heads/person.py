@@ -10,6 +10,7 @@ import numpy as np
 
 from renderer.errors import InputError
 from renderer.parameters import Parameters, nested, parameter, refuse_unknown, weights
+from stimuli.heads.expression import Expression
 from stimuli.heads.form import Form
 from stimuli.heads.regions import Regions
 from stimuli.heads.styles import Style
@@ -302,6 +303,7 @@ class Person(Parameters):
     torso_roll_deg: float = parameter(
         0.0, unit="degrees, right shoulder down", low=-20.0, high=20.0, source="pose"
     )
+    expression: Expression = field(default_factory=Expression)
     clothes: Clothes = field(default_factory=Clothes)
     eyes: Eyes = field(default_factory=Eyes)
     hair: Hair = field(default_factory=Hair)
@@ -325,6 +327,7 @@ class Person(Parameters):
 #: The tables of a person's file.
 _PARTS: dict[str, type[Parameters]] = {
     "form": Form,
+    "expression": Expression,
     "clothes": Clothes,
     "eyes": Eyes,
     "hair": Hair,

@@ -54,7 +54,7 @@ def _model(thing: objects.Object, scene: Scene, seed: int):
     material = scene.materials[thing.material]
     if isinstance(thing, objects.Person | objects.Scan):
         if isinstance(thing, objects.Person):
-            head = load_person(thing.person, seed, thing.dressed)
+            head = load_person(thing.person, seed, thing.dressed, thing.expression)
         else:
             head = load_scan(thing)
             own = head.model.surface.base_colour

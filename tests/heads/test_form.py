@@ -5,8 +5,10 @@ import pytest
 import trimesh
 
 from renderer.errors import InputError
+from stimuli import scenes
 from stimuli.heads import anatomy as anatomies
-from stimuli.heads import fetch, garment, mouth, mpfb, subdivide
+from stimuli.heads import fetch, garment, load_person, mouth, mpfb, subdivide
+from stimuli.heads.expression import Expression
 from stimuli.heads.form import PLACES, Form
 from stimuli.heads.person import Clothes, Person
 
@@ -86,6 +88,38 @@ def test_nostrils_are_open_and_as_deep_as_their_field(folded):
     assert not closed.masks["nostrils"].any()
     # only what faces down is lining: the wings' outer skin is not
     assert dark[folded.fine.normals @ bore > 0.75].max() == 0
+
+
+def test_an_expression_moves_its_side_by_its_millimetres():
+    data = fetch.mpfb_data()
+    base = mpfb.read_base(data).positions
+    moved = lambda **own: (Expression(**own).shown(data, base, base) - base) * mpfb.MM_PER_UNIT
+    none, smile = moved(), moved(kind="slight_smile")
+    assert not none.any()
+    left, right = base[:, 0] > 0.15, base[:, 0] < -0.15
+    high = lambda way, side: np.abs(way[side, 1]).max()
+    assert 1.5 < high(smile, left) < 4 and high(smile, left) == pytest.approx(high(smile, right))
+    one = moved(kind="slight_smile", uneven=1.0)
+    assert high(one, left) > 1.5 * high(smile, left) and high(one, right) < 0.3 * high(smile, right)
+    twice = moved(kind="slight_smile", strength=2.0)
+    np.testing.assert_allclose(twice, 2 * smile, atol=1e-9)
+    # a movement of one's own goes over the kind's
+    np.testing.assert_allclose(
+        moved(kind="slight_smile", movements={"smile": 0.0, "mouth_wide": 0.0}), none, atol=1e-12
+    )
+    up, down = moved(kind="raised_brows"), moved(kind="frown")
+    brow = np.linalg.norm(up, axis=1).argmax()
+    assert up[brow, 1] > 1.5 and down[np.linalg.norm(down, axis=1).argmax(), 1] < -1.5
+
+
+def test_a_scene_gives_a_person_another_expression():
+    head = {"shape": "person", "expression": {"kind": "frown"}}
+    table = {"rig": "studio", "objects": {"head": head}}
+    assert scenes.read_scene(table).objects["head"].expression == {"kind": "frown"}
+    with pytest.raises(InputError, match="expression.kind is 'grin'"):
+        load_person("man", expression={"kind": "grin"})
+    with pytest.raises(InputError, match="expression.movements.wink is unknown"):
+        load_person("man", expression={"movements": {"wink": 1.0}})
 
 
 def test_a_shirt_lies_over_the_skin_and_hides_what_is_left_out(folded):
