@@ -22,8 +22,6 @@ from renderer.scene.graph import Item
 EXTINCTION = 1.5  # of the whole layer of hair along its normal, for light from everywhere
 MINIMUM_PX = 1.3  # a thinner strand is drawn so wide, and its opacity is its width's share of it
 FREE_MM = 6.0  # from its root a point keeps off the skin's own shadow by so much less
-SHEEN = 0.5  # of R: scales that are worn or lifted send the rest elsewhere; by eye, on black hair
-LEAVES_MM = (40.0, 140.0)  # so far from its root hair has left what lights the root
 LONG_POINTS = 8  # strands of more points are the scalp's
 MANY = 20000  # strands: of so many, half stand for all in a lamp's map
 COLUMNS = 2048  # texels of a row of points
@@ -76,7 +74,7 @@ class Hair:
                 "places": self._per_point(self.points, tapered),
                 "tangents": self._per_point(self.tangents, self.of),
                 "covers": self._per_point(self.normals[self.of], strands.cover),
-                "colours": self._per_strand(strands.colour, width),
+                "colours": self._per_strand(strands.colour, strands.sheen),
                 "environments": self._per_strand(self.environment, strands.first[:-1]),
             }
         return self._fixed
@@ -170,8 +168,7 @@ class Hair:
             **self.fixed(),
             "lit_map": self._lit,
             "extinction": EXTINCTION,
-            "sheen": SHEEN,
-            "leaves": tuple(self.size * mm for mm in LEAVES_MM),
+            "leaves": tuple(self.size * mm for mm in strands.leaves_mm),
             "tilt": float(np.radians(strands.tilt_deg)),
             "spread": float(np.radians(strands.spread_deg)),
             "index": strands.index,

@@ -5,10 +5,9 @@
 #include "shaders/common.glsl"
 #include "shaders/lighting.glsl"
 uniform sampler2D places; uniform sampler2D tangents; uniform sampler2D covers;
-uniform sampler2D colours;       // a strand's: rgb: what two ways through the fibre leave of light
+uniform sampler2D colours;       // a strand's: rgb: what two ways through the fibre leave of light; w: share of mirrored light that whole scales would mirror
 uniform sampler2D environments;  // a strand's: light from everywhere on the skin at the root; w: its first point
 uniform sampler2DArray lit_map;  // (passes/hair_lit.frag)
-uniform float sheen;             // share of R that is mirrored as by whole scales
 uniform vec2 leaves;             // mm from the root: hair that hangs far from it is lit from where it is
 uniform float extinction;        // of the whole layer along its normal
 uniform float tilt;              // of the cuticle's scales, radians
@@ -20,7 +19,7 @@ float lobe(float x, float width) { return exp(-0.5 * x * x / (width * width)) / 
 
 // Scattering times the cosine to the fibre's normal plane; t points to the tip. Longitudinal lobes are normal distributions of the sum of
 // the two sines, which has twice the width of Marschner's half angle.
-vec3 fibre(vec3 t, vec3 l, vec3 v, vec3 colour, float f0) {
+vec3 fibre(vec3 t, vec3 l, vec3 v, vec3 colour, float f0, float sheen) {
     float si = clamp(dot(t, l), -0.999, 0.999), so = clamp(dot(t, v), -0.999, 0.999);
     float ci = sqrt(1.0 - si * si), co = sqrt(1.0 - so * so);
     float cd = max(cos(0.5 * (asin(so) - asin(si))), 0.2), sum = si + so;
@@ -44,7 +43,9 @@ void main() {
     vec4 cover = texelFetch(covers, at, 0);
     int strand = int(t.w + 0.5), columns = textureSize(colours, 0).x;
     ivec2 own = ivec2(strand % columns, strand / columns);
-    vec3 colour = texelFetch(colours, own, 0).rgb;
+    vec4 fibre_own = texelFetch(colours, own, 0);
+    vec3 colour = fibre_own.rgb;
+    float sheen = fibre_own.w;
     vec4 rooted = texelFetch(environments, own, 0);
     int first = int(rooted.w + 0.5);
     vec3 v = normalize(camera_position - p);
@@ -62,7 +63,10 @@ void main() {
     vec3 around = mix(rooted.rgb, 0.8 * PI * environment(n, 2.0), hanging);
     vec3 sum = around * open_to * (colour + 0.2 * forward) / PI;
     float facing = max(dot(n, v), 0.05);
-    sum += environment(reflect(-v, n), 6.0) * schlick(f0, facing) * open_to * 0.1;
+    // what is mirrored near the root lies over the skin's horizon
+    vec3 mirrored = reflect(-v, n);
+    float above = mix(smoothstep(-0.1, 0.5, dot(mirrored, cover.xyz)), 1.0, hanging);
+    sum += environment(mirrored, 6.0) * schlick(f0, facing) * open_to * 0.2 * sheen * above;
     for (int k = 0; k < lamps; ++k) {
         vec2 lit = texelFetch(lit_map, ivec3(at, k), 0).rg;
         if (lit.y <= 0.0) continue;
@@ -70,7 +74,7 @@ void main() {
         float si = dot(t.xyz, l), ci = sqrt(max(1.0 - si * si, 0.0));
         float straight = exp(-lit.x);
         vec3 passed = (1.0 - straight) * 0.7 * pow(forward, vec3(1.0 + 0.8 * lit.x));
-        vec3 scattered = straight * fibre(t.xyz, l, v, colour, f0) + (0.75 * straight * colour + passed * colour) * ci / PI;
+        vec3 scattered = straight * fibre(t.xyz, l, v, colour, f0, sheen) + (0.75 * straight * colour + passed * colour) * ci / PI;
         sum += lamp_light(k, p) * lit.y * scattered;
     }
     radiance = vec4(sum, 1.0);

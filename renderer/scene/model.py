@@ -138,7 +138,9 @@ class Strands:
     points (N, 3) mm, strand by strand from root to tip; first (S + 1,) where each begins, and N;
     width_mm (S,) at the root, tip (S,) that at the end as a share of it; colour (S, 3) linear: what
     two ways through the fibre leave of light (absorption); cover (N,) in [0, 1], the share of the
-    hair layer above each point; root_vertex (S,) index into Surface. Of all fibres: tilt_deg of the
+    hair layer above each point; root_vertex (S,) index into Surface; sheen (S,) in [0, 1]: of what
+    whole scales would mirror. leaves_mm: from there to there along a strand it leaves what lights
+    its root. Of all fibres: tilt_deg of the
     cuticle's scales, spread_deg, the standard deviation of the primary highlight, and the
     refractive index (Marschner et al. 2003, table 1, doi:10.1145/882262.882345).
     """
@@ -150,6 +152,8 @@ class Strands:
     colour: np.ndarray
     cover: np.ndarray
     root_vertex: np.ndarray
+    sheen: np.ndarray
+    leaves_mm: tuple[float, float] = (40.0, 140.0)
     tilt_deg: float = 3.5
     spread_deg: float = 7.5
     index: float = 1.55

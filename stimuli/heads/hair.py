@@ -152,7 +152,8 @@ def scalp_hair(
     if not own.scalp or not mask.any():
         return []
     around = scalp.positions
-    rough = mask + 0.20 * _noise(around, 2.6, 0.3)[:, 0] + 0.10 * _noise(around, 7.0, 1.0)[:, 1]
+    rough = mask + 0.22 * _noise(around, 2.6, 0.3)[:, 0] + 0.20 * _noise(around, 6.0, 1.0)[:, 1]
+    rough += 0.14 * _noise(around, 15.0, rng.uniform(0, 6))[:, 2]
     sides = np.where(around[:, 0] < style.part_mm, -1.0, 1.0)
     says = growth.combed(style, around, eyes, sides)
     density = smoothstep(0.10, 0.95, rough) * (mask > 0.02) * says.density
@@ -361,7 +362,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: 
         side = np.sign(centre[0])
         uneven = own.brow_uneven * rng.normal(size=5)
         low, arch = own.brow_low_mm + 0.5 * uneven[0], own.brow_arch_mm * (1 + 0.10 * uneven[1])
-        long, peak = own.brow_length_mm * (1 + 0.03 * uneven[2]), 0.64 + 0.04 * uneven[3]
+        long, peak = own.brow_length_mm * (1 + 0.03 * uneven[2]), own.brow_peak + 0.04 * uneven[3]
         turn = 0.07 * uneven[4]
         phase = rng.uniform(0, 2 * np.pi, 3)
 
@@ -373,7 +374,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: 
         fine = rng.random(count + int(own.brow_fine * count)) >= 1 / (1 + own.brow_fine)
         many = len(fine)
         u = rng.uniform(-0.03, 1.0, 8 * many)
-        there = smoothstep(-0.04, 0.16, u) * (1 - 0.75 * smoothstep(0.60, 1.0, u))
+        there = smoothstep(-0.04, 0.16, u) * (1 - (1 - own.brow_tail) * smoothstep(0.60, 1.0, u))
         u = u[rng.random(len(u)) < there][:many]
         half = own.brow_half_mm * (1 - 0.60 * smoothstep(0.42, 1.0, u))
         half = half * (0.70 + 0.30 * smoothstep(-0.05, 0.30, u))
@@ -413,7 +414,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: 
             np.where(fine, 0.6, 0.3)[:, None] * np.ones(POINTS),
             roots.vertex,
         )
-        out.append({**packed, "tip": np.full(many, 0.12)})
+        out.append({**packed, "tip": np.full(many, 0.12), "sheen": np.full(many, own.brow_sheen)})
     return out
 
 
@@ -439,7 +440,7 @@ def stubble(scalp: Scalp, rng: np.random.Generator, count: int, own: Hair) -> di
         np.clip(0.7 * flat[:, None] * (1 - np.linspace(0, 1, POINTS)), 0, 1),
         roots.vertex,
     )
-    return {**packed, "tip": np.full(count, 0.9)}
+    return {**packed, "tip": np.full(count, 0.9), "sheen": np.full(count, own.brow_sheen)}
 
 
 def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int, own: Hair) -> dict:
@@ -493,20 +494,24 @@ def all_strands(
         stubble(scalp, rng, int(own.stubble * share), own),
         vellus(scalp, eyes, rng, int(own.vellus * share), own),
     ]
-    return joined(parts)
+    return joined(parts, own)
 
 
-def joined(parts: list[dict]) -> Strands:
-    """Strands of several growths: points (S, P, 3), P one for each, and cover (S, P)."""
+def joined(parts: list[dict], own: Hair) -> Strands:
+    """Strands of several growths: points (S, P, 3), P one for each, and cover (S, P); what they do
+    not say themselves is the person's.
+    """
     counts = np.concatenate([np.full(len(p["points"]), p["points"].shape[1]) for p in parts])
     flat = {
         "points": [p["points"].reshape(-1, 3) for p in parts],
         "cover": [p["cover"].ravel() for p in parts],
         "tip": [p.get("tip", np.full(len(p["points"]), TIP)) for p in parts],
+        "sheen": [p.get("sheen", np.full(len(p["points"]), own.sheen)) for p in parts],
         **{key: [p[key] for p in parts] for key in ("width_mm", "colour")},
     }
     return Strands(
         **{key: np.concatenate(each).astype(np.float32) for key, each in flat.items()},
         first=np.concatenate([[0], np.cumsum(counts)]),
         root_vertex=np.concatenate([p["root_vertex"] for p in parts]).astype(np.int64),
+        leaves_mm=own.leaves_mm,
     )

@@ -137,7 +137,7 @@ def draw(seed: int, bounds: Bounds | None = None) -> dict[str, Any]:
     about = {"seed": int(seed), "sex": sex, "age": age, "tone": round(tone, 2)}
     targets = _macro(sex, age, ancestry) | _face(rng, sex, age, bounds.apart)
     eyes = _eyes(rng, light, tone, age)
-    hair = _hair(rng, sex, age, light, tone, ancestry)
+    hair = _hair(int(seed), rng, sex, age, light, tone, ancestry)
     skin_table = _skin(rng, sex, age, tone, light, hair["colour"])
     if hair["grey"] > 0:  # the scalp is dark of roots
         skin_table["scalp"] = _rounded(0.9 - 0.45 * hair["grey"], 2)
@@ -282,7 +282,9 @@ def _cloth(rng: np.random.Generator) -> list[float]:
     return [_rounded(dark * rng.uniform(0.8, 1.25), 4) for _ in range(3)]
 
 
-def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dict[str, Any]:
+def _hair(
+    seed: int, rng, sex: str, age: float, light: float, tone: float, ancestry
+) -> dict[str, Any]:
     names = list(_HAIRS)
     odds = [(1 - light) * _HAIRS[n][1] + light * _HAIRS[n][2] for n in names]
     colour = np.array(_HAIRS[_choice(rng, names, odds)][0]) * rng.uniform(0.8, 1.25)
@@ -293,6 +295,7 @@ def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dic
         "style": _style(rng, sex, age, ancestry[0]),
         "brows": int(rng.uniform(420, 660) * (1.0 if sex == "male" else 0.8)),
         "brow_half_mm": _rounded(rng.normal(4.3 if sex == "male" else 3.2, 0.4), 2),
+        **_brows(seed, sex, age),
         "stubble": int(rng.uniform(8000, 40000)) if sex == "male" else 0,
     }
     pale = (1 - tone) ** 2
@@ -300,6 +303,27 @@ def _hair(rng, sex: str, age: float, light: float, tone: float, ancestry) -> dic
         _rounded(v, 4) for v in (0.02 + 0.20 * pale, 0.014 + 0.136 * pale, 0.010 + 0.09 * pale)
     ]
     return table
+
+
+def _brows(seed: int, sex: str, age: float) -> dict[str, float]:
+    """Where brows begin, how they rise and how they end: a man's lie lower and flatter and are
+    fuller at the tail, which thins with age.
+    """
+    rng, male = np.random.default_rng([seed, 20261126, 2]), sex == "male"
+    aged = float(np.clip((age - 45) / 30, 0, 1))
+
+    def about(mean: float, deviation: float, digits: int = 1) -> float:
+        return _rounded(mean + deviation * float(np.clip(rng.normal(), -2, 2)), digits)
+
+    return {
+        "brow_low_mm": about(10.6 if male else 11.6, 0.6),
+        "brow_arch_mm": about(4.0 if male else 5.4, 1.1),
+        "brow_inner_mm": about(-18.8 if male else -17.4, 1.3),
+        "brow_length_mm": about(43.5 if male else 42.0, 2.0),
+        "brow_peak": about(0.65, 0.04, 2),
+        "brow_tail": about((0.34 if male else 0.22) * (1 - 0.5 * aged), 0.06, 2),
+        "brow_hair_mm": about((8.2 if male else 6.8) + 1.5 * male * aged, 0.5),
+    }
 
 
 def _style(rng, sex: str, age: float, curly: float) -> str:

@@ -18,7 +18,17 @@ SURFACE = ("positions", "normals", "uvs", "faces", "masks")
 PROXY = ("positions", "normals", "faces", "albedo", "masks")
 EYE = ("positions", "normals", "faces", "centre", "gaze", "radius", "iris_radius")
 EYE += ("tissue", "edges", "edges_mm", "vessels")
-STRANDS = ("points", "first", "width_mm", "tip", "colour", "cover", "root_vertex")
+STRANDS = (
+    "points",
+    "first",
+    "width_mm",
+    "tip",
+    "colour",
+    "cover",
+    "root_vertex",
+    "sheen",
+    "leaves_mm",
+)
 SPARSE = ("data", "indices", "indptr", "shape")
 
 
@@ -40,7 +50,7 @@ def arrays_of(model: Model) -> caches.Arrays:
     arrays = {f"surface_{name}": getattr(model.surface, name) for name in SURFACE}
     arrays |= {f"proxy_{name}": getattr(proxy, name) for name in PROXY}
     arrays |= {f"to_full_{name}": np.asarray(getattr(proxy.to_full, name)) for name in SPARSE}
-    arrays |= {f"strands_{name}": getattr(strands, name) for name in STRANDS}
+    arrays |= {f"strands_{name}": np.asarray(getattr(strands, name)) for name in STRANDS}
     arrays |= {f"landmark_{name}": place for name, place in model.landmarks.items()}
     for k, worn in enumerate(model.garments):
         cloth, own = worn.surface, worn.surface.proxy

@@ -197,6 +197,27 @@ class Hair(Parameters):
     brows: int = parameter(
         540, unit="hairs a brow", low=0, high=5000, source="250 to 500 of adults, by eye"
     )
+    sheen: float = parameter(
+        0.5,
+        unit="of what whole scales mirror",
+        low=0.0,
+        high=1.0,
+        source="Robbins 2012, scales wear and lift; by eye, on black hair",
+    )
+    brow_sheen: float = parameter(
+        0.12,
+        unit="of what whole scales mirror",
+        low=0.0,
+        high=1.0,
+        source="of brows and beard, which lie in disorder; by eye",
+    )
+    leaves_mm: tuple[float, float] = parameter(
+        (40.0, 140.0),
+        unit="mm from the root",
+        low=1.0,
+        high=700.0,
+        source="begins to leave and has left what lights the root: a neck's to a head's width",
+    )
     brow_fine: float = parameter(
         0.9, unit="fine hairs below each", low=0.0, high=5.0, source="by eye"
     )
@@ -215,6 +236,12 @@ class Hair(Parameters):
         -18.0, unit="mm outwards of the eye's centre", low=-40.0, high=10.0, source="by eye"
     )
     brow_length_mm: float = parameter(43.0, unit="mm", low=10.0, high=80.0, source="by eye")
+    brow_peak: float = parameter(
+        0.64, unit="of its length", low=0.3, high=0.9, source="the lateral third, by eye"
+    )
+    brow_tail: float = parameter(
+        0.25, unit="of the hairs of its body", low=0.0, high=1.0, source="by eye"
+    )
     brow_hair_mm: float = parameter(8.0, unit="mm, longest", low=1.0, high=25.0, source="by eye")
     brow_light: float = parameter(0.35, unit="of the colour", low=0.1, high=6.0, source="by eye")
     stubble: int = parameter(30000, unit="hairs", low=0, high=100000, source="second trial")
@@ -234,7 +261,7 @@ class Hair(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("stubble_mm", "vellus_mm"):
+        for name in ("stubble_mm", "vellus_mm", "leaves_mm"):
             low, high = getattr(self, name)
             if low > high:
                 raise InputError(f"{self.where(name)} is {(low, high)}; expected the shorter first")

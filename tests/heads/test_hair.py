@@ -161,3 +161,11 @@ def test_brows_differ_fade_at_the_tail_and_follow_what_is_said():
         assert np.median(way[u > 0.85, 0]) > 0 > np.median(way[u > 0.85, 1])
         widths = left["width_mm"]
         assert np.quantile(widths, 0.9) < 0.12 and np.quantile(widths, 0.1) < 0.04
+        assert (left["sheen"] == own.brow_sheen).all() and own.brow_sheen < own.sheen
+    ends = []
+    for said in (0.0, 1.0):
+        own = Hair.read({"brow_tail": said, "brow_uneven": 0.0}, "hair")
+        left, _ = hair.brows(plane, eyes, np.random.default_rng(2), 600, own)
+        u = (left["points"][:, 0, 0] - 32.0 - own.brow_inner_mm) / own.brow_length_mm
+        ends.append((u > 0.9).mean() / (np.abs(u - 0.4) < 0.05).mean())
+    assert ends[0] < 0.15 and ends[1] == pytest.approx(1.0, abs=0.25)

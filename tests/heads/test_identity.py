@@ -87,6 +87,22 @@ def test_the_people_that_ship_have_the_exposure_of_their_skin(name):
     assert table["exposure"] == pytest.approx(exposure(table["skin"]), abs=0.02) and table["about"]
 
 
+def test_brows_are_people_s_own_and_men_s_the_fuller():
+    drawn = [draw(seed, Bounds(sex)) for sex in ("female", "male") for seed in range(12)]
+    low, high = (
+        np.mean([table["hair"]["brow_half_mm"] * table["hair"]["brows"] for table in each])
+        for each in (drawn[:12], drawn[12:])
+    )
+    assert high > 1.4 * low
+    for tables in (drawn, [person_table(name) for name in names(PEOPLE)]):
+        read = [Person.read(table, "person").hair for table in tables]
+        shapes = {
+            (h.brows, h.brow_half_mm, h.brow_arch_mm, h.brow_inner_mm, h.brow_tail) for h in read
+        }
+        assert len(shapes) == len(read)
+        assert np.ptp([h.brow_arch_mm for h in read]) > 2.0
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

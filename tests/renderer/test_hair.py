@@ -15,7 +15,7 @@ from renderer.scene.lights import DistantLight
 from renderer.scene.material import Material
 
 
-def stand_of(points, width_mm, back_mm=-200.0, lamp=3.0):
+def stand_of(points, width_mm, back_mm=-200.0, lamp=3.0, sheen=0.5):
     """Strands (S, P, 3) of one width before a square of 400 mm, under a lamp along +z: a graph."""
     count = len(points)
     corners = 200.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
@@ -38,6 +38,7 @@ def stand_of(points, width_mm, back_mm=-200.0, lamp=3.0):
         np.tile(np.float32([0.1, 0.06, 0.04]), (count, 1)),
         np.zeros(points.shape[0] * points.shape[1], np.float32),
         np.zeros(count, np.int64),
+        np.full(count, sheen, np.float32),
     )
     graph = SceneGraph(Environment((0.1, 0.1, 0.1)), subject=np.zeros(3))
     graph.add_model(Model(surface, (), strands, {}, Material(medium="")), np.eye(4))
@@ -177,3 +178,23 @@ def test_hair_that_hangs_far_from_its_root_is_lit_from_where_it_hangs():
     assert radiance[0] == pytest.approx(radiance[3], rel=0.02), "within 40 mm as at the root"
     assert (np.diff(radiance) < 1e-4).all()
     assert radiance[-1] == pytest.approx(0.8 * radiance[0], rel=0.05)
+
+
+@pytest.mark.parametrize("lamp", [0.0, 2.0])
+def test_sheen_is_the_share_of_what_a_fibre_mirrors(lamp):
+    """Of a lamp behind the camera Marschner's R straight on; of an even sky of 0.1 a fifth."""
+    points = np.stack([np.zeros(9), np.linspace(0, 40, 9), np.zeros(9)], axis=1)[None]
+    seen = []
+    for sheen in (0.0, 0.5, 1.0):
+        graph = stand_of(points, 0.07, back_mm=-1.0, lamp=lamp, sheen=sheen)
+        with renderer.Renderer(graph, (32, 32), 1, rays=16, shadow_map=256) as drawing:
+            (hair,) = drawing.hair
+            passes = (drawing.context, drawing.program, drawing.lamps, drawing.surroundings)
+            with hair.shade(*passes, {"camera_position": np.array([0.0, 20.0, 1e5])}) as target:
+                seen.append(target.textures[0].read()[::-1].reshape(-1, 4)[4, 1])
+    mirrored = ((1.55 - 1) / (1.55 + 1)) ** 2
+    tilt, spread = 2 * np.radians(3.5), 2 * np.radians(7.5)
+    lobe = np.exp(-0.5 * (tilt / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
+    expected = mirrored * (0.2 * 0.1 + 0.25 * lobe * lamp)
+    assert seen[2] - seen[0] == pytest.approx(expected, rel=0.05)
+    assert seen[1] - seen[0] == pytest.approx(0.5 * (seen[2] - seen[0]), rel=0.05)
