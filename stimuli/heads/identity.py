@@ -298,6 +298,8 @@ def _hair(
         **_brows(seed, sex, age),
         "stubble": int(rng.uniform(8000, 40000)) if sex == "male" else 0,
     }
+    if table["style"] == "coiled":  # coils mirror in every direction, none of them whole
+        table["sheen"] = 0.26
     pale = (1 - tone) ** 2
     table["vellus_colour"] = [
         _rounded(v, 4) for v in (0.02 + 0.20 * pale, 0.014 + 0.136 * pale, 0.010 + 0.09 * pale)
