@@ -17,6 +17,7 @@ const float SPREAD_MM = 0.9;           // of light in the sclera
 const float F0 = 0.0207;               // Fresnel at the tears' index of 1.336
 // Radians over which a lamp's edge is blurred in the tears: over the cornea, and over the uneven sclera and the corner's tissue.
 const vec2 SMOOTH = vec2(0.012, 0.09);
+const float MENISCUS = 0.16;           // and in the meniscus, whose bend is narrower than a pixel
 
 // Colour of the iris at q, mm of the gaze's frame; detail finer than a pixel fades.
 vec3 iris_colour(vec2 q, float pixel_mm, float seed) {
@@ -61,13 +62,16 @@ void main() {
 
     // the cornea's normal is exact: the mesh is not fine enough for a mirror
     vec3 n = normalize(world_normal);
+    if (tissue > 0.0) n = normalize(mix(normalize(own), n, smoothstep(0.0, 0.35, tissue)));  // the fold goes over into the ball
     float in_cap = (1.0 - tissue) * (1.0 - smoothstep(iris_radius - 0.22, iris_radius + 0.22, rim)) * step(0.0, p.z);
     n = normalize(mix(n, frame * normalize(p - vec3(0.0, 0.0, cap_z())), in_cap));
 
     // how far the lids' edges are, and their shade
     vec2 edge = has_edges == 1 ? to_edges(edges, edges_mm, front.xy) : vec2(20.0);
     float over = 0.5 * lid_shade * exp(-max(edge.y, 0.0) / (0.4 * lid_shade_mm));
-    float corner = 0.45 * lid_shade * (1.0 - sheet) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 3.0);
+    float corner = 0.62 * lid_shade * (1.0 - 0.6 * sheet) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 3.4);
+    // where a lid's rim touches the ball hardly any light comes in
+    float touch = 0.65 * lid_shade * (1.0 - sheet) * max(exp(-max(edge.x, 0.0) / 0.35), 0.55 * exp(-max(edge.y, 0.0) / 0.22));
 
     // iris, seen through the cornea
     vec3 q = to_iris(p, n * frame, -v * frame);
@@ -86,7 +90,8 @@ void main() {
     vec3 sclera = sclera_colour * (1.0 + 0.05 * fbm(solid / 2.2));
     float flush = redness * (0.10 + 0.42 * outward + 0.20 * exp(-max(min(edge.x, edge.y), 0.0) / 0.8) + 0.45 * exp(-max(edge.x + edge.y - 1.5, 0.0) / 1.8)) * (0.8 + 0.5 * fbm(solid / 3.1 + 5.0));
     sclera *= exp(-max(flush, 0.0) * vec3(0.10, 0.52, 0.50));
-    sclera *= exp(-veins * vessel * vec3(0.55, 1.9, 1.75) * (0.55 + 0.45 * outward));
+    sclera *= mix(vec3(1.0), vec3(0.93, 0.85, 0.72), 0.8 * smoothstep(0.45, 1.15, angle));  // fat below the conjunctiva is yellowish
+    sclera *= exp(-veins * vessel * vec3(0.75, 2.6, 2.35) * (0.55 + 0.45 * outward));
     // the limbus: the sclera overlaps the cornea softly, and a grey-blue ring lies under it
     float ragged = 0.16 * noise(vec3(normalize(p.xy + 1e-4) * 5.0, seed)) + 0.06 * noise(vec3(normalize(p.xy + 1e-4) * 17.0, seed));
     float white = smoothstep(iris_radius - 0.75 * limbus_mm, iris_radius + 0.45 * limbus_mm, rim + ragged);
@@ -100,11 +105,12 @@ void main() {
     // light that ends on the iris came in higher on the cornea, nearer to the lid and its lashes; the ball's sides turn away from it
     float behind = 1.0 - max(white, sheet);
     float under = min(lid_shade * (1.0 + 0.30 * behind), 1.0) * exp(-max(edge.x - 0.9 * behind, 0.0) / lid_shade_mm);
-    float sides = 0.35 * lid_shade * (1.0 - sheet) * smoothstep(0.55, 1.25, angle);
-    vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner) * (1.0 - sides)), vec3(0.90, 1.06, 1.12));  // lids send back red light
+    float sides = 0.42 * lid_shade * (1.0 - 0.6 * sheet) * smoothstep(0.55, 1.25, angle);
+    vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner) * (1.0 - sides) * (1.0 - touch)), vec3(0.90, 1.06, 1.12));  // lids send back red light
     // the corner: the fold is pink, the caruncle redder and dull
-    vec3 flesh = mix(vec3(0.58, 0.33, 0.30), vec3(0.60, 0.31, 0.26), caruncle) * (1.0 + 0.16 * fbm(solid / 0.55) - 0.10 * fbm(solid / 0.25));
-    albedo = mix(albedo, flesh, tissue);
+    // no brighter than the sclera that it stands beside
+    vec3 flesh = mix(vec3(1.02, 0.66, 0.62), vec3(1.08, 0.64, 0.56), caruncle) * sclera_colour * (1.0 + 0.22 * fbm(solid / 0.55) - 0.14 * fbm(solid / 0.25));
+    albedo = mix(albedo, flesh, clamp(tissue * (1.0 + 0.5 * noise(solid / 0.6)), 0.0, 1.0));
 
     // tears: thin everywhere, with a meniscus along the lids where the normal swings away from them
     vec3 wet_n = n;
@@ -139,12 +145,13 @@ void main() {
         float on_iris = through_cornea(qn, l * frame);
         float on_white = smoothstep(-0.25, 1.0, dot(n, l));  // light wraps: the sclera scatters
         irradiance += light_here * seen * mix(on_iris, on_white, max(white, tissue));
-        specular += seen * mirror * lamp_mirrored(k, world, r, mix(SMOOTH.x, SMOOTH.y, max(white, tissue) * (1.0 - 0.7 * wet)));
+        specular += seen * mirror * lamp_mirrored(k, world, r, max(mix(SMOOTH.x, SMOOTH.y, max(white, tissue)), MENISCUS * smoothstep(0.0, 0.4, wet)));
     }
-    irradiance *= shade * (1.0 + 0.5 * sheet);  // light comes to the corner through the lids about it too
+    irradiance *= shade * (1.0 + 0.25 * sheet);  // light comes to the corner through the lids about it too
     // what is around, mirrored; the upper lid and its lashes stand before it
-    float free = smoothstep(0.12, 0.55, open_sky) * smoothstep(-0.3, 1.6, edge.x) * (1.0 - 0.8 * tissue);
+    float free = smoothstep(0.12, 0.55, open_sky) * smoothstep(-0.3, 1.6, edge.x) * (1.0 - 0.6 * tissue);
     specular += environment(r, 1500.0) * mirror * free;
+    if (tissue > 0.0) specular *= 1.0 - 0.85 * exp(-pow((tissue - 0.12) / 0.22, 2.0));  // no bright line where the fold meets the ball
     out_irradiance = vec4(irradiance, 0.0);
     out_specular = vec4(specular, 1.0);
     out_albedo = vec4(albedo, 1.0);

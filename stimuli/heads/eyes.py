@@ -18,7 +18,7 @@ from stimuli.heads.vessels import vessel_map
 
 RINGS, SEGMENTS = 96, 96
 ACROSS, UP = 44, 30  # vertices of the sheet in the corner
-PLICA_MM, PALE = (0.1, 1.6), 0.25  # above the ball, where it pales; how much flesh is left there
+PLICA_MM, PALE = (0.0, 1.7), 0.02  # above the ball, where it pales; how much flesh is left there
 COLOURS = ("iris", "fibres", "collarette", "sclera")
 
 
@@ -101,6 +101,7 @@ def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.n
     x = np.repeat(x[:, None], UP, axis=1)
     along = (x - x_in) / ball.radius
     z = deep - 1.2 - 0.27 * ball.radius * along
+    z = z + 0.28 * np.sin(1.7 * y + 0.8) + 0.12 * np.sin(3.7 * y + 2.0)  # its border winds
     middle = np.interp(x_in, side * opening.x[:: int(side)], opening.lower[:: int(side)])
     size = 1.0 * own.caruncle
     # the caruncle, lumpy

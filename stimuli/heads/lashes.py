@@ -13,7 +13,8 @@ from stimuli.heads.person import Hair, Lashes
 # looks down, the lower one's up
 RIM_UPPER_MM, RIM_LOWER_MM = 0.28, 0.80
 TIP = 0.12  # of the width at the root
-SHADED = (0.85, 0.5)  # `cover` at root and tip: lashes stand in each other's and the brow's shade
+# `cover` at root and tip: lashes stand in each other's, the brow's and the cheek's shade
+UPPER_SHADED, LOWER_SHADED = (0.85, 0.5), (1.0, 0.9)
 BARE_MM = 5.2  # from the inner corner: over the lake of tears no lash grows
 DARKER = 0.6  # of the hair's colour
 
@@ -75,7 +76,8 @@ def _lid(
 ) -> dict:
     side = 1.0 if ball.centre[0] > 0 else -1.0
     first = side * (opening.x[0] if side > 0 else opening.x[-1]) + BARE_MM
-    last = side * (opening.x[-1] if side > 0 else opening.x[0]) - 0.5
+    # towards the outer corner they would cross those of the other lid
+    last = side * (opening.x[-1] if side > 0 else opening.x[0]) - (1.0 if upper else 2.5)
     # tufts along the lid, evenly with some play; hairs about them
     tufts = max(1, round(count / own.tufts))
     place = ((np.arange(tufts) + rng.uniform(0.0, 1.0, tufts)) / tufts) ** 0.85  # denser outwards
@@ -100,8 +102,8 @@ def _lid(
     # outwards like spokes of the ball, more so towards the temple; tips of a tuft lean together
     spoke = np.radians(-22 + 62 * u) + np.radians(8.0) * tuft_turn[of]
     spoke += np.radians(7.0) * rng.normal(size=count) - 0.25 * spread
-    rise = np.radians((-22.0 if upper else -26.0) + 5.0 * rng.normal(size=count))
-    turn = np.radians(74.0 if upper else -34.0) * (own.curl if upper else 1.0)
+    rise = np.radians((-22.0 if upper else -18.0) + 5.0 * rng.normal(size=count))
+    turn = np.radians(74.0 if upper else -24.0) * (own.curl if upper else 1.0)
     turn = turn * (1 + 0.18 * tuft_curl[of] + 0.10 * rng.normal(size=count))
     s = np.linspace(0, 1, points)
     angle = rise[:, None] + turn[:, None] * s[None] ** 0.9
@@ -109,12 +111,14 @@ def _lid(
     step = np.cos(angle)[..., None] * flat[:, None] + np.sin(angle)[..., None] * [0.0, 1.0, 0.0]
     step *= (length / (points - 1))[:, None, None]
     grown_out = np.concatenate([np.zeros((count, 1, 3)), np.cumsum(step[:, 1:], axis=1)], axis=1)
-    width = own.width_mm * (1.0 if upper else 0.75) * rng.uniform(0.8, 1.15, count)
+    width = own.width_mm * (1.0 if upper else 0.68) * rng.uniform(0.8, 1.15, count)
     return {
         "points": at[:, None] + grown_out,
         "width_mm": width,
         "colour": colour * np.exp(0.15 * rng.normal(size=(count, 1))),
-        "cover": np.tile(np.linspace(*SHADED, points), (count, 1)),
+        "cover": np.tile(
+            np.linspace(*(UPPER_SHADED if upper else LOWER_SHADED), points), (count, 1)
+        ),
         "root_vertex": vertex,
         "tip": np.full(count, TIP),
     }
