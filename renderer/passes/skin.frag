@@ -22,7 +22,7 @@ uniform vec2 lobe_roughness; uniform float lobe_share;
 uniform sampler2D skin_table;        // log albedo: columns blood, rows melanin, one block of rows a thickness (renderer/optics/skin.py)
 uniform vec2 skin_most; uniform float skin_thinnest; uniform float skin_blocks;
 uniform float melanin; uniform float blood; uniform float flush; uniform float mottling; uniform vec2 uneven;
-uniform float eyelid_blood; uniform float eyelid_epidermis; uniform vec2 lip_blood; uniform float lip_melanin; uniform float lip_epidermis;
+uniform float eyelid_blood; uniform float eyelid_epidermis; uniform vec2 lip_blood; uniform float lip_melanin; uniform float lip_melanin_inner; uniform float lip_epidermis;
 uniform float lip_haze; uniform vec3 lip_haze_colour; uniform float lip_ragged;
 uniform float freckles; uniform float freckle_share; uniform float spots; uniform float spot_share; uniform vec2 spots_mm; uniform float red_spots; uniform float red_share; uniform float moles; uniform float mole_share; uniform float vessels; uniform float veins;
 uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 shaven_left; uniform vec3 inside_left;
@@ -291,7 +291,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool ma
     m += moles * mole;
     // lips: redder towards the seam, under a thin epidermis
     float vermilion = mix(lip_blood.x, lip_blood.y, inner) * (1.0 + 0.20 * patchy + 0.22 * small + 0.16 * fine);
-    m *= mix(1.0, lip_melanin, lips);
+    m *= mix(1.0, lip_melanin * mix(1.0, lip_melanin_inner, inner), lips);
     h = mix(h, vermilion, lips);
     thickness = mix(thickness, lip_epidermis, lips);
     // hair below the surface: scalp and shaven beard, dots that merge with distance
@@ -304,7 +304,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool ma
     }
     vec3 skin = skin_colour(m / thickness, h, thickness);  // melanin lies at the epidermis's base: a thin one has as much of it
     // the dry surface and slow blood dull the vermilion, in patches and most outside; wet inside it stays red
-    float dull = lip_haze * lips * clamp(1.0 + 0.5 * small + 0.5 * fine - 0.5 * inner, 0.0, 2.0);
+    float dull = lip_haze * lips * clamp(1.0 + 0.20 * small + 0.20 * fine - 0.5 * inner, 0.0, 2.0);
     skin = mix(skin, dot(skin, vec3(0.2126, 0.7152, 0.0722)) * lip_haze_colour, min(dull, 1.0));
     if (mapped) skin = map * skin / skin_colour(m0 / thickness, h0, thickness);
     skin *= mix(vec3(1.0), scalp_left, hair * scalp_tint) * (1.0 - rooted * rooted_left - shaven * shaven_left - 0.45 * dots * max(rooted, 0.75 * shaven));

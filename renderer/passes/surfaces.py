@@ -58,6 +58,7 @@ SKIN_UNIFORMS = (
     "eyelid_epidermis",
     "lip_blood",
     "lip_melanin",
+    "lip_melanin_inner",
     "lip_epidermis",
     "lip_haze",
     "lip_haze_colour",

@@ -202,6 +202,9 @@ class Skin(Material):
         (0.034, 0.080), unit="share of blood: border, seam", low=0.0, high=0.3, source="by eye"
     )
     lip_melanin: float = parameter(0.45, source="of the skin's melanin, by eye", **_SHARE)
+    lip_melanin_inner: float = parameter(
+        1.0, source="of the lips' melanin that is left at the seam, by eye", **_SHARE
+    )
     lip_epidermis: float = parameter(0.40, source="of the epidermis, by eye", low=0.1, high=1.0)
     lip_haze: float = parameter(
         0.22, source="of the vermilion that its dry surface and venous blood dull, by eye", **_SHARE
@@ -345,7 +348,8 @@ class Skin(Material):
         spots = self.spot_share * sum(self.spots_mm) ** 3
         brown, red = (1 - self.red_share) * BROWN_MEAN, self.red_share * RED_MEAN
         freckles = (freckles + self.spots * brown * spots) * (1 - lips)
-        melanin = self.melanin * (1 + (self.lip_melanin - 1) * lips) + freckles
+        of_lips = self.lip_melanin * (1 + (self.lip_melanin_inner - 1) * inner)
+        melanin = self.melanin * (1 + (of_lips - 1) * lips) + freckles
         blood = self.blood + self.flush * flushed + self.eyelid_blood * eyelid
         blood = blood + self.mottling * (0.003 + 0.012 * flushed) * MOTTLING_MEAN
         blood = blood + self.red_spots * red * spots

@@ -10,7 +10,7 @@ from stimuli.heads.relief import Reference
 #: Front and back end of the left one on the base mesh without targets, x and z, y above the eyes.
 ENDS_MM = ((7.4, -43.0, 160.6), (12.4, -43.5, 152.6))
 BORE = (0.0, 0.94, -0.34)  # which way it leads
-WALL = 0.50  # of the half axes: where the rim begins to turn in
+WALL = 0.20  # of the half axes: where the rim begins to turn in
 ABOUT_MM = 5.0  # of the opening along its bore: what lies farther off is lip or the nose's back
 REACH = 2.6  # half axes: farther off nothing is moved
 
@@ -75,6 +75,6 @@ def opened(
         margin *= np.exp(-((along / 4.0) ** 2)) * _ramp((REACH - r) / 0.8) * close
         way = form.nostril_mm * share + form.nostril_arch_mm * margin
         moved += way[:, None] * axes[2]
-        lining = _ramp((1.0 - r) / 0.45) * _ramp((0.7 - normals @ axes[2]) / 0.5)
+        lining = _ramp((1.0 - r) / 0.8) * _ramp((0.7 - normals @ axes[2]) / 0.5)
         deep = np.maximum(deep, lining * _ramp((ABOUT_MM - np.abs(along)) / 1.5))
     return moved, deep

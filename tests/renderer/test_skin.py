@@ -65,6 +65,19 @@ def test_the_colour_is_the_spectral_models_and_what_light_bounces_off(masks):
     assert (expected[0] < pure[0] and expected[2] > pure[2]) == ("lips" in masks)
 
 
+def test_dark_lips_are_lighter_towards_the_seam_by_what_melanin_is_missing_there():
+    masks, row = {"lips": 1.0}, np.array([[float(n == "lips") for n in renderer.scene.MASKS]])
+    dark = {"melanin": 0.25, "lip_melanin": 0.8, "masks": masks}
+    means = []
+    for inner in (1.0, 0.25):
+        own = {"lip_melanin_inner": inner, **dark}
+        _, albedo = shaded({**EVEN, **FLAT, **own})
+        means.append(albedo.mean(axis=(0, 1)))
+        even = {k: tuple(v) if isinstance(v, list) else v for k, v in EVEN.items()}
+        np.testing.assert_allclose(means[-1], Skin(**{**even, **own}).mean_albedo(row)[0], rtol=0.1)
+    assert (means[1] > 1.3 * means[0]).all()
+
+
 def test_no_more_light_is_sent_back_than_comes():
     """A perfect mirror in even light from everywhere, rough and smooth, with all its relief."""
     mirror = {"f0": 1.0, "f0_oily": 1.0, "masks": {"oil": 0.6, "pores": 0.5}}
