@@ -33,3 +33,9 @@ float through_lid(vec3 local) { return 1.0 - tarsus * (1.0 - smoothstep(3.0, 6.0
 // And through a lip, of whose mask 0.5 is the border and 1 the seam: it is muscle below a thin vermilion.
 uniform float lip_muscle;
 float through_lip(float mask) { return 1.0 - lip_muscle * smoothstep(0.45, 0.75, mask); }
+// And through an ear: all of it but the lobe is a plate of cartilage between two thin skins. local: mm; the ears: their middles.
+uniform float cartilage; uniform vec3 ear_l; uniform vec3 ear_r;
+float through_ear(vec3 local) {
+    vec3 to_l = local - ear_l, to_r = local - ear_r, off = dot(to_l, to_l) < dot(to_r, to_r) ? to_l : to_r;
+    return 1.0 - cartilage * smoothstep(50.0, 40.0, length(off)) * smoothstep(-22.0, -12.0, off.y);
+}

@@ -320,18 +320,23 @@ class Surfaces:
         }
 
     def _lids(self, drawn: Drawn) -> dict:
-        """The uniforms of passes/lids.glsl: the lids of a surface before the eyes of its mesh."""
+        """The uniforms of passes/lids.glsl: the lids of a surface before the eyes of its mesh, and
+        what stops light in them, in lips and in ears.
+        """
         eyes = [eye for eye in self.eyes if eye.item.mesh == drawn.item.mesh][:2]
         eyes = [eye for eye in eyes if eye.item.primitive.eye.edges.size > 2]
         shapes = [eye.item.primitive.eye for eye in eyes]
         material = drawn.item.primitive.material.value
         balls = [[*shape.centre, shape.radius] for shape in shapes]
+        marks, nowhere = drawn.item.primitive.landmarks, np.full(3, 1e6)
         textures = [eye.maps["edges"] for eye in eyes if eye.maps]
         textures += [self._no_edges] * (2 - len(textures))
         return {
             "lid_count": len(eyes),
             "tarsus": material.tarsus if isinstance(material, Skin) else Skin.tarsus,
             "lip_muscle": material.lip_muscle if isinstance(material, Skin) else Skin.lip_muscle,
+            "cartilage": material.cartilage if isinstance(material, Skin) else Skin.cartilage,
+            **{name: marks.get(name, nowhere) for name in ("ear_l", "ear_r")},
             "lid_ball": np.array(balls + [[0.0, 0.0, 0.0, 1.0]] * (2 - len(balls))),
             "edges_a": textures[0],
             "edges_b": textures[1],

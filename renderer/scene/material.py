@@ -218,6 +218,9 @@ class Skin(Material):
     lip_muscle: float = parameter(
         0.95, source="of what comes through a lip, that its muscle stops, by eye", **_SHARE
     )
+    cartilage: float = parameter(
+        0.5, source="of what comes through an ear, that its cartilage stops, by eye", **_SHARE
+    )
     freckles: float = parameter(
         0.035, unit="share of melanin more", low=0.0, high=0.6, source="by eye"
     )

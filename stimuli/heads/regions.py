@@ -44,7 +44,7 @@ _WEIGHTS = {
         "nose": 0.75,
         "wings": 0.5,
         "ears": 0.10,
-        "rims": 0.62,
+        "rims": 0.42,
         "rings": 0.14,
         "knuckle": 0.30,
         "chin": 0.28,

@@ -11,6 +11,7 @@ import renderer
 from renderer.errors import InputError
 from renderer.optics import media
 from renderer.optics import skin as spectral
+from renderer.optics.transmittance import Translucency
 from renderer.scene.material import LUMINANCE, Skin
 from stimuli import scenes
 
@@ -84,6 +85,36 @@ def test_no_more_light_is_sent_back_than_comes():
     sky = {"lights": {"sun": False}, "environment": {"ambient": [1.0, 1.0, 1.0]}}
     specular, _ = shaded(mirror, **sky)
     assert 0.5 < specular.mean() < 1 and specular.max() < 1.005
+
+
+def through(cartilage, ear):
+    """Light (3,) that comes through the middle of a slab 3 mm thick, lit from behind, where an
+    ear's middle lies at ear (3,) mm from it, or is nowhere.
+    """
+    table = {
+        "objects": {"slab": {"shape": "slab", "size_mm": [24.0, 24.0, 3.0]}},
+        "materials": {"slab": {"kind": "skin", "medium": "skin", "cartilage": cartilage}},
+        "lights": {"sun": {"direction": [0.0, 0.0, -1.0], "irradiance": [20.0] * 3}},
+        "camera": {"framing": "slab", "height_mm": 6.0, "angle": "front"},
+    }
+    graph = scenes.stage(scenes.read_scene(table)).graph
+    for node in graph.mesh_nodes:
+        for primitive in node.mesh.primitives:
+            middle = primitive.positions.mean(axis=0)
+            primitive.landmarks = {} if ear is None else {"ear_l": middle + ear}
+    with (
+        renderer.Renderer(graph, (16, 16), 1, rays=8, shadow_map=128) as drawing,
+        drawing.frame() as frame,
+    ):
+        return frame.transmitted(Translucency()).read()[..., :3].mean(axis=(0, 1))
+
+
+def test_cartilage_stops_light_in_an_ear_but_not_in_its_lobe_nor_elsewhere():
+    plain = through(0.6, None)
+    assert plain[0] > 0.01
+    np.testing.assert_allclose(through(0.6, np.array([0.0, -5.0, 0.0])), 0.4 * plain, rtol=0.02)
+    np.testing.assert_allclose(through(0.0, np.array([0.0, -5.0, 0.0])), plain, rtol=0.01)
+    np.testing.assert_allclose(through(0.6, np.array([0.0, 30.0, 0.0])), plain, rtol=0.01)
 
 
 OILY = {"masks": {"oil": 0.7, "pores": 0.3}, "oil_patches": 0.0}
