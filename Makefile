@@ -9,10 +9,11 @@
 # make setup          install what is missing, nothing else
 # make bench          measure: tables of every benchmarks/*.py; make bench BENCH=photons for one alone
 # make gallery        draw the pictures of docs/gallery.md again
+# make pages          photograph the pages that docs/studies.md and docs/serving.md show again
 # make translations   collect the messages of the pages into app/translations/*/*.po and compile them
 # make clean          remove what was built; .venv stays
 .DEFAULT_GOAL := help
-.PHONY: help setup gallery test test-bayes test-cluster test-parquet test-postgres test-visibility demo bench translations clean
+.PHONY: help setup gallery pages test test-bayes test-cluster test-parquet test-postgres test-visibility demo bench translations clean
 
 SERVE ?= 1
 OUT ?= build/thesis
@@ -97,6 +98,14 @@ gallery: setup
 	$(JPEG) build/spheres.png docs/scenes/spheres.jpg
 	$(JPEG) build/stone.png docs/scenes/stone.jpg
 	$(JPEG) build/illumination/gallery.png docs/illumination.jpg
+
+# What docs/studies.md and docs/serving.md show of the questionnaire and of the dashboard.
+pages:
+	@tools/setup test
+	$(SUBDERMAL) build docs/pages.toml --out build/pages
+	rm -rf build/pages/simulated*
+	$(SUBDERMAL) simulate build/pages --participants 60 --seed 7
+	.venv/bin/python tools/pages build/pages
 
 translations: setup
 	mkdir -p build
