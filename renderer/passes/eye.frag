@@ -118,7 +118,7 @@ void main() {
     if (has_edges == 1 && meniscus_mm > 0.0) {
         for (int k = 0; k < 2; ++k) {
             float d = k == 0 ? edge.x : edge.y, tall = k == 0 ? 0.6 * meniscus_mm : meniscus_mm * max(1.0 + 0.5 * noise(solid / 1.3) + 0.4 * noise(solid / 0.5), 0.1);
-            float t = 1.0 - clamp(d / tall, 0.0, 1.0);
+            float t = (1.0 - clamp(d / tall, 0.0, 1.0)) * smoothstep(-0.5, -0.1, d);  // none on a ball that stands out of its lids
             wet = max(wet, t);
             vec2 away = away_from_edge(edges, edges_mm, front.xy, k);
             wet_n = normalize(wet_n + mat3(model) * vec3(away, 0.15) / size * (1.9 * t * t));
