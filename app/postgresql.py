@@ -75,7 +75,10 @@ def listen(engine: Engine) -> None:
 
         def stands(self) -> bool:
             """Whether the other end has not closed the connection; raises where it says why."""
-            self._read_all()
+            try:
+                self._read_all()
+            except OSError:  # reset, which the driver lets through where it reads a reply's start
+                return False
             with selectors.DefaultSelector() as sockets:
                 sockets.register(self._usock, selectors.EVENT_READ)
                 if sockets.select(0):  # closed, or a notice that nobody waits for

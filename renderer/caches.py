@@ -7,9 +7,11 @@ read is made anew. Each is held below LIMIT_MB: what was not used for longest go
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import os
+import time
 import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -21,6 +23,7 @@ import numpy as np
 
 #: Megabytes of a cache of arrays, unless $SUBDERMAL_CACHE_MB says otherwise; 0: nothing is kept.
 LIMIT_MB = 1024
+STALE_S = 3600.0  # a half written file that is older was left by a process that ended
 
 Arrays = dict[str, np.ndarray]
 
@@ -134,7 +137,7 @@ def keep(name: str, key: str, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
         return
     file = folder() / name / f"{key}.npz"
     try:
-        _write(file, arrays)
+        _write(file, arrays, most)
         _prune(file.parent, most)
     except OSError as error:
         warnings.warn(f"nothing is kept in {file.parent}: {error}", stacklevel=2)
@@ -152,27 +155,35 @@ def kept(name: str, key: str, make: Callable[[], Arrays]) -> Arrays:
         except UNREADABLE:
             pass  # not whole
     arrays = make()
-    if sum(array.nbytes for array in arrays.values()) <= limit_bytes():
-        keep(name, key, arrays.items())
+    keep(name, key, arrays.items())
     return arrays
 
 
-def _write(file: Path, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
-    """The file is there whole or not at all."""
+def _write(file: Path, arrays: Iterable[tuple[str, np.ndarray]], most: int) -> None:
+    """The file is there whole or not at all; what takes more than `most` bytes is not written."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(f".{file.name}.{os.getpid()}.part")
+    written = 0
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_STORED) as packed:
             for name, array in arrays:
                 with packed.open(f"{name}.npy", "w", force_zip64=True) as stream:
                     np.lib.format.write_array(stream, np.asanyarray(array), allow_pickle=False)
+                if (written := written + array.nbytes) > most:
+                    return
         os.replace(part, file)
     finally:
         part.unlink(missing_ok=True)
 
 
 def _prune(cache: Path, most: int) -> None:
-    """Remove what was not used for longest until `most` bytes are left."""
+    """Remove what was not used for longest until `most` bytes are left, and what killed processes
+    left half written.
+    """
+    for path in cache.glob(".*.part"):
+        with contextlib.suppress(FileNotFoundError):
+            if time.time() - path.stat().st_mtime > STALE_S:
+                path.unlink()
     entries = []
     for path in cache.glob("*.npz"):
         try:

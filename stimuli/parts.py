@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -55,3 +56,19 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: line {line}: not UTF-8 text") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not TOML: {error}") from error
+
+
+def merge(table: Mapping[str, Any], patch: Mapping[str, Any]) -> dict[str, Any]:
+    """`patch` over `table`: tables are merged, other values replace, false removes a table."""
+    result = dict(table)
+    for key, value in patch.items():
+        old = result.get(key)
+        if value is False and isinstance(old, Mapping):
+            del result[key]
+        elif isinstance(value, Mapping) and isinstance(old, Mapping):
+            result[key] = merge(old, value)
+        elif isinstance(value, Mapping):
+            result[key] = merge({}, value)
+        else:
+            result[key] = value
+    return result

@@ -130,7 +130,7 @@ _WORDING = ("question", "scale", "familiarity", "consent")
 class Level:
     """A level of a factor: its name in files and tables, its label for people.
 
-    patch: what it changes in the scene's table (stimuli.scenes.merge); region: the part of the
+    patch: what it changes in the scene's table (stimuli.parts.merge); region: the part of the
     image that a framing is about, left, top, right, bottom from 0 to 1.
     """
 
@@ -457,7 +457,7 @@ def with_head(scene: dict, name: str, said: Mapping[str, Any] | None = None) -> 
         shape = {"shape": "scan", "file": name, **said}
     else:
         shape = {"shape": "person", "person": name}
-        shape |= {"dressed": own["dressed"]} if "dressed" in own else {}
+        shape |= {key: own[key] for key in ("dressed", "expression") if key in own}
     objects = {**scene.get("objects", {}), subject: {**place, **shape}}
     return {**scene, "objects": objects, **({"materials": materials} if materials else {})}
 

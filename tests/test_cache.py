@@ -75,6 +75,24 @@ def test_what_was_not_used_for_longest_goes_first(made, folder, monkeypatch):
     assert {path.stem for path in (folder / "light").iterdir()} == {"one", "three"}
 
 
+def test_what_is_larger_than_the_cache_drives_nothing_out(made, folder, monkeypatch):
+    monkeypatch.setenv("SUBDERMAL_CACHE_MB", "3")
+    made("one")
+    large = [("a", np.zeros(2 << 20, np.uint8)), ("b", np.zeros(2 << 20, np.uint8))]
+    caches.keep("light", "large", iter(large))
+    assert [path.name for path in (folder / "light").iterdir()] == ["one.npz"]
+
+
+def test_what_a_killed_process_left_half_written_goes(made, folder):
+    made("one")
+    old, new = folder / "light/.x.npz.1.part", folder / "light/.y.npz.2.part"
+    for part in (old, new):
+        part.write_bytes(b"half")
+    os.utime(old, (0, 0))
+    made("two")
+    assert new.exists() and not old.exists()
+
+
 def test_half_a_file_is_made_anew(made, folder):
     made("one")
     file = folder / "light/one.npz"

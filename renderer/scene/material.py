@@ -230,7 +230,7 @@ class Skin(Material):
     )
     spot_share: float = parameter(0.40, source="of cells of 9 mm, red ones too, by eye", **_SHARE)
     spots_mm: tuple[float, float] = parameter(
-        (0.9, 3.2), unit="mm across: least, largest", low=0.1, high=9.0, source="by eye"
+        (0.9, 3.2), unit="mm across: least, largest", low=0.1, high=5.0, source="by eye"
     )
     red_spots: float = parameter(
         0.045, unit="share of blood more", low=0.0, high=0.3, source="by eye"

@@ -9,7 +9,7 @@ from typing import Any
 
 from renderer.scene import Model
 from renderer.scene.objects import Scan
-from stimuli.parts import person_table
+from stimuli.parts import merge, person_table
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def load_person(
     name = Path(name_or_path).stem
     table = person_table(name_or_path)
     if expression:
-        table = {**table, "expression": {**table.get("expression", {}), **expression}}
+        table = merge(table, {"expression": expression})
     person = Person.read(table, name)
     if not dressed:
         person = replace(person, clothes=replace(person.clothes, kind="none"))

@@ -3,7 +3,7 @@
 A scene file is TOML (thesis.toml is the one to copy). `rig` names a file of lights and an
 environment (stimuli/lights), `person` one of people (stimuli/people); what the scene itself says
 goes over what they say. `[framings.NAME]` are cameras of the scene's own. A level of a study is a
-patch of the scene's table: `merge`.
+patch of the scene's table: `stimuli.parts.merge`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stimuli.errors import InputError
-from stimuli.parts import LIGHTS, SCENES, part, person_table, read_toml
+from stimuli.parts import LIGHTS, SCENES, merge, part, person_table, read_toml
 
 if TYPE_CHECKING:
     from renderer.scene import Camera, Scene
@@ -47,22 +47,6 @@ def load_table(name_or_path: str | Path, beside: Path | None = None) -> dict[str
     return _absolute(read_toml(path), path.parent)
 
 
-def merge(table: Mapping[str, Any], patch: Mapping[str, Any]) -> dict[str, Any]:
-    """`patch` over `table`: tables are merged, other values replace, false removes a table."""
-    result = dict(table)
-    for key, value in patch.items():
-        old = result.get(key)
-        if value is False and isinstance(old, Mapping):
-            del result[key]
-        elif isinstance(value, Mapping) and isinstance(old, Mapping):
-            result[key] = merge(old, value)
-        elif isinstance(value, Mapping):
-            result[key] = merge({}, value)
-        else:
-            result[key] = value
-    return result
-
-
 def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
     """The table with its named parts put in: the rig's lights, the people's own skin.
 
@@ -80,6 +64,10 @@ def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
         raise InputError(f"{where}.objects is {objects!r:.60}; expected a table of named tables")
     objects, materials = dict(objects), dict(table.get("materials", {}))
     for name, entry in objects.items():
+        if isinstance(entry, Mapping) and "expression" in entry and entry.get("shape") == "person":
+            from stimuli.heads.expression import Expression
+
+            Expression.read(entry["expression"], f"{where}.objects.{name}.expression")
         if not isinstance(entry, Mapping) or "material" in entry:
             continue
         own: dict[str, Any] = {}

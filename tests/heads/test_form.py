@@ -7,7 +7,7 @@ import trimesh
 from renderer.errors import InputError
 from stimuli import scenes
 from stimuli.heads import anatomy as anatomies
-from stimuli.heads import fetch, garment, load_person, mouth, mpfb, subdivide
+from stimuli.heads import fetch, garment, mouth, mpfb, subdivide
 from stimuli.heads.expression import Expression
 from stimuli.heads.form import PLACES, Form
 from stimuli.heads.person import Clothes, Person
@@ -116,10 +116,14 @@ def test_a_scene_gives_a_person_another_expression():
     head = {"shape": "person", "expression": {"kind": "frown"}}
     table = {"rig": "studio", "objects": {"head": head}}
     assert scenes.read_scene(table).objects["head"].expression == {"kind": "frown"}
-    with pytest.raises(InputError, match="expression.kind is 'grin'"):
-        load_person("man", expression={"kind": "grin"})
-    with pytest.raises(InputError, match="expression.movements.wink is unknown"):
-        load_person("man", expression={"movements": {"wink": 1.0}})
+    for wrong, words in (
+        ({"kind": "grin"}, "head.expression.kind is 'grin'"),
+        ({"movements": {"wink": 1.0}}, "head.expression.movements.wink is unknown"),
+        ("frown", "head.expression is 'frown'"),
+    ):
+        table["objects"] = {"head": {"shape": "person", "expression": wrong}}
+        with pytest.raises(InputError, match=words):
+            scenes.read_scene(table)
 
 
 def test_a_shirt_lies_over_the_skin_and_hides_what_is_left_out(folded):
