@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ LIMIT_MB = 1024
 STALE_S = 3600.0  # a half written file that is older was left by a process that ended
 
 Arrays = dict[str, np.ndarray]
+T = TypeVar("T")
 
 
 def folder() -> Path:
@@ -107,18 +109,17 @@ def parts(value: object) -> Iterator:
 UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 
 
-def opened(name: str, key: str) -> np.lib.npyio.NpzFile | None:
-    """The file of a key in the cache `name`, whose arrays are read one by one, or None.
-
-    Reading them raises one of UNREADABLE where the file is not whole. Use it as a context manager.
+def read(name: str, key: str, use: Callable[[np.lib.npyio.NpzFile], T]) -> T | None:
+    """What `use` makes of the arrays of a key in the cache `name`, which it reads one by one; None
+    where they are not there, or not whole.
     """
     if not limit_bytes():
         return None
     file = folder() / name / f"{key}.npz"
     try:
-        stored = np.load(file, allow_pickle=False)
-        os.utime(file)
-        return stored
+        with np.load(file, allow_pickle=False) as stored:
+            os.utime(file)
+            return use(stored)
     except UNREADABLE:
         return None
 
@@ -148,12 +149,8 @@ def kept(name: str, key: str, make: Callable[[], Arrays]) -> Arrays:
 
     A cache that cannot be written is said in a warning, and the arrays are returned all the same.
     """
-    if (stored := opened(name, key)) is not None:
-        try:
-            with stored:
-                return {one: stored[one] for one in stored.files}
-        except UNREADABLE:
-            pass  # not whole
+    if (stored := read(name, key, dict)) is not None:
+        return stored
     arrays = make()
     keep(name, key, arrays.items())
     return arrays

@@ -65,18 +65,15 @@ def _primitive(part) -> Iterator:
 
 def load_shadows(key: str, lamps: Lamps, hair: list[Hair]) -> bool:
     """Fill the lamps' maps and the hair's light from the cache; False where they are not there."""
-    stored = caches.opened("shadows", key)
-    if stored is None:
-        return False
-    try:
-        with stored:
-            for name, texture in lamps.maps().items():
-                texture.set_bits(stored[name])
-            for k, own in enumerate(hair):
-                own.set_lit(stored[f"hair_{k}"])
-    except caches.UNREADABLE:
-        return False
-    return True
+
+    def fill(stored) -> bool:
+        for name, texture in lamps.maps().items():
+            texture.set_bits(stored[name])
+        for k, own in enumerate(hair):
+            own.set_lit(stored[f"hair_{k}"])
+        return True
+
+    return bool(caches.read("shadows", key, fill))
 
 
 def keep_shadows(key: str, lamps: Lamps, hair: list[Hair]) -> None:
@@ -93,23 +90,20 @@ def keep_shadows(key: str, lamps: Lamps, hair: list[Hair]) -> None:
 
 def load_view(key: str, target: gl.Target) -> bool:
     """Fill a target's textures from the cache; False where they are not there, or not whole."""
-    stored = caches.opened("views", key)
-    if stored is None:
-        return False
-    try:
-        with stored:
-            for low, high in _bands(target.height):
-                shape = (high - low, target.width)
-                packed = stored[f"covered_{low}"]
-                covered = np.unpackbits(packed, count=shape[0] * shape[1]).reshape(shape) > 0
-                for k, texture in enumerate(target.textures):
-                    values = stored[f"{k}_{low}"]
-                    texels = np.zeros((*shape, values.shape[1]), values.dtype)
-                    texels[covered] = values
-                    texture.write_rows(low, texels)
-    except caches.UNREADABLE:
-        return False
-    return True
+
+    def fill(stored) -> bool:
+        for low, high in _bands(target.height):
+            shape = (high - low, target.width)
+            packed = stored[f"covered_{low}"]
+            covered = np.unpackbits(packed, count=shape[0] * shape[1]).reshape(shape) > 0
+            for k, texture in enumerate(target.textures):
+                values = stored[f"{k}_{low}"]
+                texels = np.zeros((*shape, values.shape[1]), values.dtype)
+                texels[covered] = values
+                texture.write_rows(low, texels)
+        return True
+
+    return bool(caches.read("views", key, fill))
 
 
 def keep_view(key: str, target: gl.Target) -> None:

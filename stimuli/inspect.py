@@ -16,6 +16,7 @@ import numpy as np
 from PIL import Image
 
 from analysis.manifest import open_manifest
+from renderer.scene.picture import LUMA
 from stimuli.compare import coloured
 from stimuli.errors import InputError
 from stimuli.experiment.visibility import IDENTICAL
@@ -193,7 +194,7 @@ def _grown(mask: np.ndarray, pixels: int = 2) -> np.ndarray:
 
 
 def _picture(cell: str, name: str, pixels: np.ndarray, lab: np.ndarray, skin: np.ndarray):
-    luminance = float((decode_srgb(pixels / 255) @ [0.2126, 0.7152, 0.0722])[skin].mean())
+    luminance = float((decode_srgb(pixels / 255) @ LUMA)[skin].mean())
     clipped = float((pixels == 255).any(axis=2)[skin].mean())
     return Picture(
         cell,
@@ -213,7 +214,7 @@ def noise(pixels: np.ndarray, where: np.ndarray) -> float:
     from scipy.ndimage import convolve
 
     kernel = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], float)
-    grey = pixels.astype(float) @ [0.2126, 0.7152, 0.0722]
+    grey = pixels.astype(float) @ LUMA
     return float(np.median(np.abs(convolve(grey, kernel))[where]) / 0.6745 / 6)
 
 

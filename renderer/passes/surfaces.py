@@ -327,15 +327,14 @@ class Surfaces:
         eyes = [eye for eye in eyes if eye.item.primitive.eye.edges.size > 2]
         shapes = [eye.item.primitive.eye for eye in eyes]
         material = drawn.item.primitive.material.value
+        skin = material if isinstance(material, Skin) else Skin  # whose defaults stop light too
         balls = [[*shape.centre, shape.radius] for shape in shapes]
         marks, nowhere = drawn.item.primitive.landmarks, np.full(3, 1e6)
         textures = [eye.maps["edges"] for eye in eyes if eye.maps]
         textures += [self._no_edges] * (2 - len(textures))
         return {
             "lid_count": len(eyes),
-            "tarsus": material.tarsus if isinstance(material, Skin) else Skin.tarsus,
-            "lip_muscle": material.lip_muscle if isinstance(material, Skin) else Skin.lip_muscle,
-            "cartilage": material.cartilage if isinstance(material, Skin) else Skin.cartilage,
+            **{name: getattr(skin, name) for name in ("tarsus", "lip_muscle", "cartilage")},
             **{name: marks.get(name, nowhere) for name in ("ear_l", "ear_r")},
             "lid_ball": np.array(balls + [[0.0, 0.0, 0.0, 1.0]] * (2 - len(balls))),
             "edges_a": textures[0],

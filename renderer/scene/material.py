@@ -12,6 +12,7 @@ import numpy as np
 from renderer.errors import InputError
 from renderer.optics import skin
 from renderer.parameters import Parameters, parameter, weights
+from renderer.scene.picture import LUMA
 
 #: What a head's masks say, in the order of their columns: how much of each, in [0, 1].
 MASKS = ("lips", "flush", "hair", "eyelid", "pores", "oil", "beard", "inside")
@@ -25,7 +26,6 @@ _SHARE = {"low": 0.0, "high": 1.0}
 # of their least and largest size.
 FRECKLE_MEAN, MOTTLING_MEAN, DOTS_MEAN = 0.0074, 0.27, 0.05
 BROWN_MEAN, RED_MEAN = 6.0e-5, 6.9e-5
-LUMINANCE = (0.2126, 0.7152, 0.0722)
 # What is left of the skin's colour under and between hair, and in the mouth and the nostrils.
 SCALP, ROOTED, INSIDE = (0.22, 0.21, 0.21), (0.36, 0.32, 0.27), (0.50, 0.26, 0.24)
 SHAVEN = (0.21, 0.15, 0.09)  # what roots below shaven skin take of its colour: red most
@@ -367,7 +367,7 @@ class Skin(Material):
         column = {name: masks[:, k : k + 1] for k, name in enumerate(MASKS)}
         albedo = skin.shown(self.layers, *self.pigments(masks))
         lips, inner = lip_places(column["lips"])
-        dull = albedo @ np.array(LUMINANCE)[:, None] * np.array(self.lip_haze_colour)
+        dull = albedo @ LUMA[:, None] * np.array(self.lip_haze_colour)
         albedo = albedo + self.lip_haze * lips * (1 - 0.5 * inner) * (dull - albedo)
         hair = _smoothstep(0.15, 1.0, column["hair"])
         rooted, shaven = 0.75 * hair, 0.75 * self.beard * column["beard"] * (1 - hair)

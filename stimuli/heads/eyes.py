@@ -13,6 +13,7 @@ from renderer.scene.cornea import normals, reach
 from renderer.scene.model import EYE_VALUES
 from stimuli.heads.lids import MAP_MM, Eyeball, Opening
 from stimuli.heads.person import Eyes
+from stimuli.heads.smooth import smoothstep
 from stimuli.heads.subdivide import vertex_normals
 from stimuli.heads.vessels import vessel_map
 
@@ -117,8 +118,7 @@ def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.n
     above = z - front
     z = z + 0.5 * size * np.exp(-((above - 0.5) ** 2) / 0.30)
     local = np.stack([side * x, y, z], axis=2).reshape(-1, 3)
-    t = np.clip((z - front - PLICA_MM[0]) / (PLICA_MM[1] - PLICA_MM[0]), 0, 1)
-    flesh = PALE + (1 - PALE) * t * t * (3 - 2 * t)
+    flesh = PALE + (1 - PALE) * smoothstep(*PLICA_MM, z - front)
     lump = np.clip(1.2 * lump, 0, 1)
     tissue = np.stack([np.maximum(flesh, lump), lump], axis=2).reshape(-1, 2)
     return ball.centre + local, tissue

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
-from stimuli.heads.skin import HEAD_AXIS_Z, smoothstep
+from stimuli.heads.skin import HEAD_AXIS_Z
+from stimuli.heads.smooth import smoothstep
 from stimuli.heads.styles import Style
 
 CELL_MM = 4.0  # of the grid of distances

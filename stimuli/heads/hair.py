@@ -15,7 +15,8 @@ from renderer.scene.shapes import points_on, triangle_areas
 from stimuli.heads import growth, lashes
 from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.person import Hair, Lashes
-from stimuli.heads.skin import azimuth, smoothstep
+from stimuli.heads.skin import azimuth
+from stimuli.heads.smooth import smoothstep
 from stimuli.heads.styles import Style
 
 POINTS = 7
@@ -158,9 +159,7 @@ def scalp_hair(
     says = growth.combed(style, around, eyes, sides)
     density = smoothstep(0.10, 0.95, rough) * (mask > 0.02) * says.density
     # beside a parting few strands lie over the scalp: there roots are denser
-    away = np.abs(around[:, 0] - style.part_mm)
-    beside = growth.parting_nearness(style, around, eyes) * np.exp(-away / PART_BESIDE_MM)
-    density *= 1 + style.part_dense * beside
+    density *= 1 + style.part_dense * _beside_parting(style, around, eyes)
     roots = scatter_roots(scalp, density, int(own.scalp * share), rng)
     skin, longest = _around(scalp, mask, own), own.scalp_length
     groups = [_styled(roots, skin, scalp, eyes, rng, share, own)]
@@ -237,9 +236,8 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
     height = says.height * np.clip(0.15 + 0.85 * deep + 0.16 * draw(0.8, 0.6, 0.0), 0.05, 1.3)
     height = np.where(fly, says.height * rng.uniform(0.9, 1.9, count) + 1.0, height)
     height *= 0.35 + 0.65 * smoothstep(0.1, 0.9, whole)
-    beside = growth.parting_nearness(style, p, eyes)
-    beside = beside * np.exp(-np.abs(p[:, 0] - style.part_mm) / PART_BESIDE_MM)
-    lift = style.lift_deg + style.part_lift_deg * beside + 9 * draw(0.5, 0.5, 0.7)
+    beside = style.part_lift_deg * _beside_parting(style, p, eyes)
+    lift = style.lift_deg + beside + 9 * draw(0.5, 0.5, 0.7)
     lift = np.radians(np.clip(lift, 3, 88))
     points = style.points
     curves = growth.grow(style, skin, eyes, p, n, sides, length, height, turn, lift, points)
@@ -286,6 +284,12 @@ def _out_of_the_head(curves: np.ndarray, skin: growth.Grid, times: int):
         flat[deep] += (keep_off[deep] - at[deep, 0])[:, None] * at[deep, 1:]
         at[deep] = skin.at(flat[deep])
     return flat.reshape(curves.shape), at
+
+
+def _beside_parting(style: Style, p: np.ndarray, eyes: np.ndarray) -> np.ndarray:
+    """How much of the parting points (N, 3) feel, (N,) in [0, 1]."""
+    away = np.abs(p[:, 0] - style.part_mm)
+    return growth.parting_nearness(style, p, eyes) * np.exp(-away / PART_BESIDE_MM)
 
 
 def alone_before_the_face(curves: np.ndarray, eyes: np.ndarray, share: float) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 from renderer.errors import InputError
 from renderer.optics import skin
 from renderer.parameters import Parameters, parameter
+from renderer.scene.picture import LUMA
 
 ANCESTRIES = ("african", "asian", "caucasian")  # of MakeHuman's data
 SEXES = ("female", "male")
@@ -170,7 +171,7 @@ def exposure(table: dict[str, Any], share: float = 0.25) -> float:
     """
     layers = skin.Layers.read({k: v for k, v in table.items() if k in skin.Layers.names()}, "skin")
     albedo = skin.colour(layers, table["melanin"], table["blood"])
-    luminance = float(np.asarray(albedo).ravel()[:3] @ [0.2126, 0.7152, 0.0722])
+    luminance = float(np.asarray(albedo).ravel()[:3] @ LUMA)
     return _rounded((0.30 / luminance) ** share)
 
 

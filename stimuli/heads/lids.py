@@ -20,6 +20,7 @@ import numpy as np
 
 from renderer.scene.cornea import reach
 from stimuli.heads.person import Eyes
+from stimuli.heads.smooth import smoothstep
 
 STEP_MM = 0.15  # of the rays that an opening is measured with
 BEHIND_MM = 3.0  # so far behind the ball's front a ray has to come for it to have gone between lids
@@ -166,11 +167,6 @@ def _smooth(
     return Opening(first + t * (last - first), mean - half, mean + half, corners)
 
 
-def _step(low: float, high: float, x: np.ndarray) -> np.ndarray:
-    t = np.clip((x - low) / (high - low), 0, 1)
-    return t * t * (3 - 2 * t)
-
-
 class _Shape:
     """How the skin about one eye is moved: from a measured opening to a person's."""
 
@@ -274,11 +270,11 @@ class _Shape:
         was, own = self.measured, self.own
         x, y, z = p.T
         first, last = was.x[0], was.x[-1]
-        edge = 1 - _step(20.0, REGION_MM, np.linalg.norm(p, axis=1))
+        edge = 1 - smoothstep(20.0, REGION_MM, np.linalg.norm(p, axis=1))
         # along: corners go to their new places, the nose's side and the temple stay
         knots = [-REGION_MM, first - 16.0, first, 2.0, last, last + 12.0, REGION_MM]
         goals = [*knots[:2], self.medial, 2.0, self.lateral, *knots[-2:]]
-        beside = 1 - _step(7.0, 17.0, np.abs(y - self.line))
+        beside = 1 - smoothstep(7.0, 17.0, np.abs(y - self.line))
         new_x = x + edge * beside * (PchipInterpolator(knots, goals, extrapolate=True)(x) - x)
         # up: edges go to theirs, in the height that is asked for
         lower, upper = was.at(x)
@@ -287,17 +283,17 @@ class _Shape:
         beyond = np.maximum(first - x, x - last)  # the corners
         above = np.maximum(y - upper, lower - y)  # the edges
         shift = (1 - t) * (low - lower) + t * (high - upper)
-        shift *= (1 - _step(0.0, 8.0, beyond)) * (1 - _step(2.0, 9.0, above))
+        shift *= (1 - smoothstep(0.0, 8.0, beyond)) * (1 - smoothstep(2.0, 9.0, above))
         new_y = y + edge * shift
         # depth: edges go on to the ball, and lids get thinner
         low, high = self._depth(new_x)
-        forward = ((1 - t) * low + t * high) * (1 - _step(0.0, 12.0, beyond))
-        forward *= 1 - _step(2.0, 13.0, above)
+        forward = ((1 - t) * low + t * high) * (1 - smoothstep(0.0, 12.0, beyond))
+        forward *= 1 - smoothstep(2.0, 13.0, above)
         height = np.maximum(np.linalg.norm(p, axis=1) - self.contact, 0)
-        thin = (1 - own.lid_thickness) * (1 - _step(3.0, 12.0, above))
-        thin *= 0.3 + 0.7 * _step(self.medial - 1, self.medial + 8, new_x)
-        thin *= (1 - _step(0.0, 10.0, beyond)) * (1 - _step(3.5, 9.0, height))
-        front = _step(-3.0, 4.0, z)
+        thin = (1 - own.lid_thickness) * (1 - smoothstep(3.0, 12.0, above))
+        thin *= 0.3 + 0.7 * smoothstep(self.medial - 1, self.medial + 8, new_x)
+        thin *= (1 - smoothstep(0.0, 10.0, beyond)) * (1 - smoothstep(3.5, 9.0, height))
+        front = smoothstep(-3.0, 4.0, z)
         return np.column_stack([new_x, new_y, z + edge * front * (forward - thin * height)])
 
 
@@ -314,9 +310,9 @@ def _folded(points: np.ndarray, shape: _Shape, own: Eyes) -> np.ndarray:
     above = p[:, 1] + shape.line - shape.goal(p[:, 0])[1]  # the upper edge
     arch = np.sin(np.pi * np.clip(t, 0, 1))
     up = above - own.crease_mm * (0.35 + 0.65 * arch**0.8)
-    share = _step(0.05, 0.45, t) * (1 - _step(0.70, 1.15, t))
-    share *= _step(0.7, 1.5, distance - own.radius_mm)  # the lid's outside
-    full = _step(-0.1, CREASE_SOFT_MM, up)
+    share = smoothstep(0.05, 0.45, t) * (1 - smoothstep(0.70, 1.15, t))
+    share *= smoothstep(0.7, 1.5, distance - own.radius_mm)  # the lid's outside
+    full = smoothstep(-0.1, CREASE_SOFT_MM, up)
     full *= np.exp(-((np.maximum(up - CREASE_SOFT_MM, 0) / FOLD_FADES_MM) ** 2))
     groove = np.exp(-(((up + 0.1) / CREASE_HALF_MM) ** 2))
     towards = p / distance[:, None] * [1.0, 0.3, 1.0] - [0.0, FOLD_DOWN, 0.0]
@@ -338,7 +334,7 @@ def clear(points: np.ndarray, ball: Eyeball, own: Eyes, gaze: np.ndarray) -> np.
     surface = reach(unit @ gaze, ball.radius, own.iris_mm) + CLEAR_MM
     bulge = surface - CLEAR_MM - ball.radius
     height = distance[near] - ball.radius
-    new = distance[near] + bulge * (1 - _step(1.5, 8.0, height)) * (height > -2.0)
+    new = distance[near] + bulge * (1 - smoothstep(1.5, 8.0, height)) * (height > -2.0)
     result = points.copy()
     result[near] = ball.centre + unit * np.maximum(new, surface)[:, None]
     return result
@@ -355,8 +351,8 @@ def _eased(points: np.ndarray, faces: np.ndarray, shape: _Shape) -> np.ndarray:
     corner = np.array([shape.medial, shape.corners[0] - shape.line])
     result = points.copy()
     for offset, full, none, rounds in EASED:
-        share = 1 - _step(full, none, np.linalg.norm(local[:, :2] - corner - offset, axis=1))
-        share *= _step(1.0, 2.2, away) * (local[:, 2] > 0)
+        share = 1 - smoothstep(full, none, np.linalg.norm(local[:, :2] - corner - offset, axis=1))
+        share *= smoothstep(1.0, 2.2, away) * (local[:, 2] > 0)
         result = _smoothed(result, faces, share, rounds)
     return result
 

@@ -91,22 +91,28 @@ def _crossings(faces, lips) -> tuple[np.ndarray, np.ndarray]:
 
 def border(points, faces, lips) -> np.ndarray:
     """Points (K, 3) on the border of the mask lips (N,), between the vertices."""
-    ends, t = _crossings(faces, lips)
+    return _along(points, *_crossings(faces, lips))
+
+
+def _along(points, ends, t) -> np.ndarray:
     return points[ends[:, 0]] * (1 - t) + points[ends[:, 1]] * t
 
 
 def outer_border(points, normals, faces, lips) -> np.ndarray:
     """Points (K, 3) on the border of the vermilion with the skin, as seen from the front."""
-    ends, _ = _crossings(faces, lips)
-    line = border(points, faces, lips)
+    ends, t = _crossings(faces, lips)
+    line = _along(points, ends, t)
     return line[(line[:, 2] > line[:, 2].max() - DEEP_MM) & (normals[ends[:, 0], 2] > 0.1)]
 
 
 def heights(points, normals, faces, lips) -> tuple[np.ndarray, ...]:
     """x (K,), the seam's height there and the vermilion's above and below it, (K,) mm each."""
+    return _heights(points, normals, lips, outer_border(points, normals, faces, lips))
+
+
+def _heights(points, normals, lips, line) -> tuple[np.ndarray, ...]:
     x, upper, lower = seam(points, normals, lips)
     between = 0.5 * (upper + lower)
-    line = outer_border(points, normals, faces, lips)
     over = line[:, 1] - np.interp(line[:, 0], x, between)
     found = []
     for way in (1, -1):
@@ -126,8 +132,8 @@ def sized(points, normals, faces, lips, upper_lip, wanted_mm) -> np.ndarray:
     Heights above the seam are scaled, and what a lip stands out before its border by the same
     factor; the skin beyond follows over FOLLOWS_MM.
     """
-    x, between, *found = heights(points, normals, faces, lips)
     line = outer_border(points, normals, faces, lips)
+    x, between, *found = _heights(points, normals, lips, line)
     middle = 0.5 * (x[0] + x[-1])
     front = points[lips > LIPS][:, 2].max()
     deep = np.clip((points[:, 2] - front + DEEP_MM) / 8, 0, 1)

@@ -6,6 +6,7 @@ import numpy as np
 
 from stimuli.heads.form import Form
 from stimuli.heads.relief import Reference
+from stimuli.heads.smooth import smoothstep
 
 #: Front and back end of the left one on the base mesh without targets, x and z, y above the eyes.
 ENDS_MM = ((7.4, -43.0, 160.6), (12.4, -43.5, 152.6))
@@ -13,11 +14,6 @@ BORE = (0.0, 0.94, -0.34)  # which way it leads
 WALL = 0.20  # of the half axes: where the rim begins to turn in
 ABOUT_MM = 5.0  # of the opening along its bore: what lies farther off is lip or the nose's back
 REACH = 2.6  # half axes: farther off nothing is moved
-
-
-def _ramp(x: np.ndarray) -> np.ndarray:
-    t = np.clip(x, 0, 1)
-    return t * t * (3 - 2 * t)
 
 
 def _frames(form: Form, reference: Reference):
@@ -68,13 +64,16 @@ def opened(
     for middle, half, axes in _frames(form, reference):
         r, out, along = _within(points, middle, half, axes)
         close = (r < REACH) & (np.abs(along) < 2 * ABOUT_MM)
-        share = _ramp((ABOUT_MM - np.abs(along)) / 1.5) * _ramp((0.35 - normals @ axes[2]) / 0.3)
-        share *= _ramp((1.0 - r) / (1.0 - WALL)) * close
+        about = smoothstep(0, 1, (ABOUT_MM - np.abs(along)) / 1.5)
+        share = about * smoothstep(0, 1, (0.35 - normals @ axes[2]) / 0.3)
+        share *= smoothstep(0, 1, (1.0 - r) / (1.0 - WALL)) * close
         # the margin of the wing, both its skin and its lining
-        margin = np.exp(-(((r - 1.15) / 0.75) ** 2)) * _ramp((out - 0.1) / 0.7)
-        margin *= np.exp(-((along / 4.0) ** 2)) * _ramp((REACH - r) / 0.8) * close
+        margin = np.exp(-(((r - 1.15) / 0.75) ** 2)) * smoothstep(0, 1, (out - 0.1) / 0.7)
+        margin *= np.exp(-((along / 4.0) ** 2)) * smoothstep(0, 1, (REACH - r) / 0.8) * close
         way = form.nostril_mm * share + form.nostril_arch_mm * margin
         moved += way[:, None] * axes[2]
-        lining = _ramp((1.0 - r) / 0.8) * _ramp((0.7 - normals @ axes[2]) / 0.5)
-        deep = np.maximum(deep, lining * _ramp((ABOUT_MM - np.abs(along)) / 1.5))
+        lining = smoothstep(0, 1, (1.0 - r) / 0.8) * smoothstep(
+            0, 1, (0.7 - normals @ axes[2]) / 0.5
+        )
+        deep = np.maximum(deep, lining * about)
     return moved, deep

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from stimuli.heads.form import PLACES, Form, Place, Relief
+from stimuli.heads.smooth import smoothstep
 from stimuli.heads.subdivide import triangles
 
 STEP_MM = 0.5  # between the samples of a curve
@@ -125,11 +126,6 @@ def _curve(name, place, relief, side, points, reference: Reference) -> Curve:
     )
 
 
-def _ramp(x):
-    t = np.clip(x, 0, 1)
-    return t * t * (3 - 2 * t)
-
-
 def narrow(made: list[Curve], points: np.ndarray) -> np.ndarray:
     """(N,) bool: the points so near to a narrow curve that coarse triangles would blur it."""
     near = np.zeros(len(points), bool)
@@ -163,10 +159,10 @@ def offsets(made: list[Curve], points: np.ndarray, normals: np.ndarray) -> np.nd
         t = curve.along[which]
         share = np.ones(len(t))
         if len(curve.points) > 1:
-            share *= _ramp(t / begin) if begin else 1.0
-            share *= _ramp((1 - t) / end) if end else 1.0
+            share *= smoothstep(0, 1, t / begin) if begin else 1.0
+            share *= smoothstep(0, 1, (1 - t) / end) if end else 1.0
         facing = (normals[near] * normal).sum(axis=1)
-        share *= _ramp((facing - 0.05) / 0.35)
+        share *= smoothstep(0, 1, (facing - 0.05) / 0.35)
         height = relief.height_mm * np.exp(-((d / relief.width_mm) ** 2))
         if relief.bulge_mm:
             across = np.cross(normal, tangent)

@@ -10,13 +10,9 @@ from renderer.scene import MASKS
 from stimuli.heads import mouth as mouths
 from stimuli.heads.anatomy import Anatomy, Bust
 from stimuli.heads.regions import Regions
+from stimuli.heads.smooth import smoothstep
 
 HEAD_AXIS_Z = 45.0  # mm: the vertical axis of the skull that azimuths are measured about
-
-
-def smoothstep(low: float, high: float, x: np.ndarray) -> np.ndarray:
-    t = np.clip((x - low) / (high - low), 0, 1)
-    return t * t * (3 - 2 * t)
 
 
 def _wobble(p: np.ndarray, scale: float) -> np.ndarray:

@@ -64,11 +64,13 @@ def complete(table: Mapping[str, Any], where: str = "scene") -> dict[str, Any]:
         raise InputError(f"{where}.objects is {objects!r:.60}; expected a table of named tables")
     objects, materials = dict(objects), dict(table.get("materials", {}))
     for name, entry in objects.items():
-        if isinstance(entry, Mapping) and "expression" in entry and entry.get("shape") == "person":
+        if not isinstance(entry, Mapping):
+            continue
+        if "expression" in entry and entry.get("shape") == "person":
             from stimuli.heads.expression import Expression
 
             Expression.read(entry["expression"], f"{where}.objects.{name}.expression")
-        if not isinstance(entry, Mapping) or "material" in entry:
+        if "material" in entry:
             continue
         own: dict[str, Any] = {}
         if entry.get("shape") == "person":

@@ -12,7 +12,8 @@ from renderer.errors import InputError
 from renderer.optics import media
 from renderer.optics import skin as spectral
 from renderer.optics.transmittance import Translucency
-from renderer.scene.material import LUMINANCE, Skin
+from renderer.scene.material import Skin
+from renderer.scene.picture import LUMA
 from stimuli import scenes
 
 EVEN = {
@@ -62,7 +63,7 @@ def test_the_colour_is_the_spectral_models_and_what_light_bounces_off(masks):
     # only what dulls the lips is not of the model: it keeps their luminance to a few per cent
     pure = dataclasses.replace(skin, lip_haze=0.0).mean_albedo(row)[0]
     np.testing.assert_allclose(pure, model, rtol=0.02)
-    np.testing.assert_allclose(expected @ LUMINANCE, pure @ LUMINANCE, rtol=0.02)
+    np.testing.assert_allclose(expected @ LUMA, pure @ LUMA, rtol=0.02)
     assert (expected[0] < pure[0] and expected[2] > pure[2]) == ("lips" in masks)
 
 
