@@ -5,32 +5,28 @@ from pathlib import Path
 
 import click
 
+#: What is in each cache; the folder of the first holds those of the others.
+CACHES = {
+    "heads": "base data of generated people, fetched again when needed",
+    "people": "generated people as arrays; made again",
+    "light": "light baked on scenes; baked again",
+    "shadows": "shadow maps of scenes; drawn again",
+    "views": "what all techniques share in a view; drawn again",
+    "skin": "colours of skin by its pigments; reckoned again",
+    "montecarlo": "simulated light in media; simulated again",
+    "reference": "walks of long reference renders; walked again",
+    "converged": "pictures that experiments compare to; drawn again",
+}
+
 
 def caches() -> dict[str, tuple[Path, str]]:
     """name -> (folder, what is in it)."""
     from renderer.caches import folder
     from renderer.optics.montecarlo import cache_folder
 
-    return {
-        "heads": (folder(), "base data of generated people, fetched again when needed"),
-        "people": (folder() / "people", "generated people as arrays; made again"),
-        "light": (folder() / "light", "light baked on scenes; baked again"),
-        "shadows": (folder() / "shadows", "shadow maps of scenes; drawn again"),
-        "views": (folder() / "views", "what all techniques share in a view; drawn again"),
-        "skin": (folder() / "skin", "colours of skin by its pigments; reckoned again"),
-        "montecarlo": (
-            cache_folder(),
-            "simulated light in media; simulated again",
-        ),
-        "reference": (
-            folder() / "reference",
-            "walks of long reference renders; walked again",
-        ),
-        "converged": (
-            folder() / "converged",
-            "pictures that experiments compare to; drawn again",
-        ),
-    }
+    folders = {name: folder() / name for name in CACHES}
+    folders |= {"heads": folder(), "montecarlo": cache_folder()}
+    return {name: (folders[name], words) for name, words in CACHES.items()}
 
 
 def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
@@ -50,19 +46,7 @@ def size_of(folder: Path, without: tuple[Path, ...] = ()) -> int:
 @click.option(
     "--clear",
     metavar="NAME",
-    type=click.Choice(
-        [
-            "heads",
-            "people",
-            "light",
-            "shadows",
-            "views",
-            "skin",
-            "montecarlo",
-            "reference",
-            "converged",
-        ]
-    ),
+    type=click.Choice(list(CACHES)),
     help="Remove this cache by its name. Nothing in it is lost for good.",
 )
 def command(clear: str | None) -> None:
