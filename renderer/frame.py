@@ -250,6 +250,7 @@ class Frame:
                 r.media[medium - 1] if r.media else None,
                 r.surroundings,
                 (*r.surfaces.surfaces, *r.surfaces.eyes),
+                r.surfaces.flesh,
             ),
             piece.first,
             self.height,

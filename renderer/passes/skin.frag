@@ -490,6 +490,6 @@ void main() {
 #ifndef DIFFUSE_ONLY
     for (int k = 0; k < lamps; ++k) through += transmitted(k, world, smooth_n);
 #endif
-    out_transmitted = vec4(mask > 0.0 ? through * (1.0 - b.w) * through_lid(local) * through_lip(a.x) * through_ear(local) : vec3(0.0), 1.0);
+    out_transmitted = vec4(mask > 0.0 ? through * through_flesh(local, a.x, b.w) : vec3(0.0), 1.0);
 #endif
 }

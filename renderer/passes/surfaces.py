@@ -288,7 +288,7 @@ class Surfaces:
         for drawn in self.surfaces:
             if drawn.id:
                 through = self._through(drawn, translucency)
-                own = {**values, "model": drawn.item.pose, **through, **self._lids(drawn)}
+                own = {**values, "model": drawn.item.pose, **through, **self.flesh(drawn)}
                 program.use(**program.accepts(own))
                 drawn.mesh.draw()
 
@@ -319,7 +319,7 @@ class Surfaces:
             "transmission_thickness": THICKNESS.index(translucency.thickness),
         }
 
-    def _lids(self, drawn: Drawn) -> dict:
+    def flesh(self, drawn: Drawn) -> dict:
         """The uniforms of passes/lids.glsl: the lids of a surface before the eyes of its mesh, and
         what stops light in them, in lips and in ears.
         """
@@ -396,7 +396,7 @@ class Surfaces:
             "lip_folds": skin.lip_folds,
             "lid_margin": skin.lid_margin,
             "lash_line": skin.lash_line,
-            **self._lids(drawn),
+            **self.flesh(drawn),
             **(_local(material) if isinstance(material, Shading) else {}),
         }
 

@@ -10,5 +10,5 @@ void main() {
     if (dot(n, camera_position - world) < 0.0 && !gl_FrontFacing) n = -n;
     vec3 total = vec3(0.0);
     for (int k = 0; k < lamps; ++k) total += transmitted(k, world, n);
-    through = vec4(total * step(0.5, scatters) * (1.0 - b.w) * through_lid(local) * through_lip(a.x) * through_ear(local), 1.0);  // b.w: inside of the mouth
+    through = vec4(total * step(0.5, scatters) * through_flesh(local, a.x, b.w), 1.0);
 }

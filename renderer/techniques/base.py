@@ -75,7 +75,7 @@ class Room:
     camera_position, view and projection; depth(): the target whose depth buffer holds what is seen;
     lamps(): with the layers of their maps; both are drawn when they are first asked for, which has
     to be before a target is bound; lights: the lamps as values; surroundings: the environment;
-    bodies: all surfaces and eyes of the scene.
+    bodies: all surfaces and eyes of the scene; flesh(drawn): the uniforms of passes/lids.glsl.
     """
 
     surfaces: tuple[Drawn, ...]
@@ -89,6 +89,7 @@ class Room:
     value: str | dict | None
     surroundings: Surroundings
     bodies: tuple[Drawn, ...]
+    flesh: Callable[[Drawn], dict[str, Any]]
 
 
 @dataclass(frozen=True)

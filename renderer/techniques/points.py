@@ -181,8 +181,13 @@ class PointsTechnique(Technique):
 
     def scatter(self, inputs: Inputs) -> Scattered:
         room = inputs.needed_room(self.name)
+        size = (inputs.width, inputs.height)
         with result(inputs) as target:
-            with gl.Target(inputs.width, inputs.height, list(SUMS)) as sums:
+            with (
+                gl.Target(*size, [GL.GL_R32F], depth=room.depth()) as kept,
+                gl.Target(*size, list(SUMS)) as sums,
+            ):
+                self._keep(inputs, room, kept)
                 sums.bind(clear=(0.0, 0.0, 0.0, 0.0))
                 for parts in self._bodies(room):
                     self._one(inputs, room, parts, sums)
@@ -192,10 +197,24 @@ class PointsTechnique(Technique):
                     arrived=sums.textures[1],
                     far=sums.textures[2],
                     irradiance=inputs.irradiance,
+                    kept=kept.textures[0],
                     normalised=int(self.weights == "normalised" and self.samples == "surface"),
                 )
                 gl.draw_fullscreen(inputs.context)
         return Scattered(target)
+
+    def _keep(self, inputs: Inputs, room: Room, kept: gl.Target) -> None:
+        """Draw what the surfaces that are seen keep of the light that comes through to them."""
+        kept.bind(clear=(1.0, 1.0, 1.0, 1.0))
+        kept.bind(depth_test=True)
+        GL.glDepthMask(False)
+        program = inputs.programs(
+            "techniques/splat_kept.frag", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert"
+        )
+        for drawn in room.surfaces:
+            own = {**room.camera, "model": drawn.item.pose, **room.flesh(drawn)}
+            program.use(**program.accepts(own))
+            drawn.mesh.draw()
 
     def _bodies(self, room: Room) -> list[tuple[Drawn, ...]]:
         """The surfaces between which light travels, group by group."""

@@ -1,5 +1,7 @@
 """Splats: points that stand for equal areas, their sum, and what they converge to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -123,3 +125,28 @@ def test_the_blur_does_not_reach_through_a_sheet():
                 got = target.textures[0].read()[..., :3].mean(axis=(0, 1))
             shell = 1 - fits.dipole(SKIN).cdf(np.array([2.0]))[0]
             np.testing.assert_allclose(got, shell, atol=0.01)
+
+
+@pytest.mark.parametrize("name", ["splat_dipole", "splat_multipole"])
+def test_flesh_stops_what_comes_through_and_nothing_else(name):
+    """An ear's cartilage that stops half, about the sheet's middle: half of the light behind it is
+    left, and all of the light in front."""
+    technique = renderer.make(name, {"spacing_mm": 1.0})
+
+    def light(inputs):
+        with technique.scatter(inputs).target as target:
+            return target.textures[0].read()[..., :3].copy()
+
+    def stopped(inputs):
+        stops = {"ear_l": np.zeros(3), "cartilage": 0.5}
+        flesh = inputs.room.flesh
+        return replace(inputs, room=replace(inputs.room, flesh=lambda d: flesh(d) | stops))
+
+    for thickness_mm, towards, kept in ((2.0, -1.0, 0.5), (30.0, 1.0, 1.0)):
+        table = behind_a_sheet(thickness_mm)
+        table["lights"]["lamp"]["direction"] = [0.0, 0.0, towards]
+        with drawn(table, (24, 24)) as frame:
+            inputs = frame.inputs(None)
+            whole = light(inputs)
+            assert whole[..., 0].min() > 0.1
+            np.testing.assert_allclose(light(stopped(inputs)), kept * whole, rtol=1e-4)
