@@ -38,7 +38,7 @@ vec3 iris_colour(vec2 q, float pixel_mm, float seed) {
     c *= 1.0 + 0.30 * exp(-pow((t - ring) / 0.045, 2.0));
     // crypts: gaps between strands that show the dark stroma, mostly just outside the collarette
     Cells gap = cells(vec3(wind * 4.6, t * 2.7 + seed));
-    float crypt = smoothstep(0.42, 0.18, gap.f1) * step(0.62, unit(mix_bits(gap.id ^ 5u))) * smoothstep(ring, ring + 0.07, t) * (1.0 - smoothstep(0.62, 0.85, t));
+    float crypt = (1.0 - smoothstep(0.18, 0.42, gap.f1)) * step(0.62, unit(mix_bits(gap.id ^ 5u))) * smoothstep(ring, ring + 0.07, t) * (1.0 - smoothstep(0.62, 0.85, t));
     c *= 1.0 - 0.42 * crypt;
     // furrows of contraction: faint arcs near the root
     float arc = (t + 0.02 * noise(vec3(around * 3.0, seed))) * 9.0;

@@ -37,7 +37,7 @@ float through_lip(float mask) { return 1.0 - lip_muscle * smoothstep(0.45, 0.75,
 uniform float cartilage; uniform vec3 ear_l; uniform vec3 ear_r;
 float through_ear(vec3 local) {
     vec3 to_l = local - ear_l, to_r = local - ear_r, off = dot(to_l, to_l) < dot(to_r, to_r) ? to_l : to_r;
-    return 1.0 - cartilage * smoothstep(50.0, 40.0, length(off)) * smoothstep(-22.0, -12.0, off.y);
+    return 1.0 - cartilage * (1.0 - smoothstep(40.0, 50.0, length(off))) * smoothstep(-22.0, -12.0, off.y);
 }
 // All of it: the share of what comes through to a place that is left. lip: the mask; inside: 1 within the mouth.
 float through_flesh(vec3 local, float lip, float inside) { return (1.0 - inside) * through_lid(local) * through_lip(lip) * through_ear(local); }

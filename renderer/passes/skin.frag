@@ -70,7 +70,7 @@ float lip_of(float mask) { return smoothstep(0.0, 0.6, mask); }         // how m
 float lip_mask(vec3 q) {
     if (a.x <= 0.0 || lip_ragged <= 0.0) return a.x;
     float wander = 0.7 * noise(q / 2.3 + 13.0) + 0.7 * noise(q / 0.9 + 29.0);
-    return clamp(a.x + lip_ragged * wander * smoothstep(0.0, 0.3, a.x) * smoothstep(0.95, 0.6, a.x), 0.0, 1.0);
+    return clamp(a.x + lip_ragged * wander * smoothstep(0.0, 0.3, a.x) * (1.0 - smoothstep(0.6, 0.95, a.x)), 0.0, 1.0);
 }
 float seam_of(float mask) { return clamp(2.0 * mask - 1.0, 0.0, 1.0); }  // how near the seam
 
@@ -118,7 +118,7 @@ Relief relief(vec3 p, float pixel_mm, Waves waves) {
     if (deep * shown > 1e-4) {
         vec3 between = 0.5 * (eye_l + eye_r), off = p - between;
         float side = abs(off.x), up = off.y;
-        float across = eye_l == eye_r ? 1.0 : max(smoothstep(8.0, 24.0, up), smoothstep(-104.0, -122.0, up));
+        float across = eye_l == eye_r ? 1.0 : max(smoothstep(8.0, 24.0, up), 1.0 - smoothstep(-122.0, -104.0, up));
         float slanted = (1.0 - across) * smoothstep(10.0, 26.0, side), upright = 1.0 - across - slanted;
         float s = off.x < 0.0 ? -0.5 : 0.5;  // sine of 30 degrees, outwards on either side
         mat3 slant = mat3(1.35 * 0.866, 0.62 * -s, 0.0, 1.35 * s, 0.62 * 0.866, 0.0, 0.0, 0.0, 1.0);
@@ -218,7 +218,7 @@ vec3 skin_colour(float m, float h, float thickness) {
 
 // A spot with a ragged border: its height in mm and gradient, as of a dome, times how much of it there is.
 float ragged(vec3 q, float f1, float radius, float size) {
-    return smoothstep(radius, 0.62 * radius, f1 + 0.30 * radius * noise(q / (0.5 * size)) + 0.16 * radius * noise(q / (0.21 * size) + 9.0));
+    return 1.0 - smoothstep(0.62 * radius, radius, f1 + 0.30 * radius * noise(q / (0.5 * size)) + 0.16 * radius * noise(q / (0.21 * size) + 9.0));
 }
 
 // Moles stand out of the skin: adds to the relief; returns how much of a mole there is.
@@ -264,7 +264,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool ma
     if (veins * layer_mottling > 0.0 && eye_l != eye_r && !mapped) {
         vec3 off = p - 0.5 * (eye_l + eye_r);
         float side = abs(off.x);
-        float there = max(smoothstep(46.0, 56.0, side) * smoothstep(-4.0, 6.0, off.y) * smoothstep(58.0, 36.0, off.y), smoothstep(-108.0, -124.0, off.y));
+        float there = max(smoothstep(46.0, 56.0, side) * smoothstep(-4.0, 6.0, off.y) * (1.0 - smoothstep(36.0, 58.0, off.y)), 1.0 - smoothstep(-124.0, -108.0, off.y));
         there *= smoothstep(0.0, 0.35, noise(q / 17.0 + 15.0)) * (1.0 - hair);
         if (there > 0.02) {
             Cells v = cells((q + vec3(5.0 * patchy, 5.0 * red, 5.0 * broad)) * vec3(1.0, 0.6, 1.0) / 30.0 + 70.0);
@@ -300,7 +300,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool ma
     float rooted = hair * (0.75 + 0.25 * noise(q / 4.0)), shaven = beard * (1.0 - hair) * clamp(0.75 + 0.35 * patchy + 0.35 * waves.middle.x, 0.0, 1.2), dots = 0.05;
     if (max(rooted, shaven) > 0.02) {
         Spot d = spot(q / 0.62 + 8.0);
-        dots = mix(0.05, smoothstep(0.24, 0.10, d.f1), fade(0.45, pixel_mm));
+        dots = mix(0.05, 1.0 - smoothstep(0.10, 0.24, d.f1), fade(0.45, pixel_mm));
     }
     vec3 skin = skin_colour(m / thickness, h, thickness);  // melanin lies at the epidermis's base: a thin one has as much of it
     // the dry surface and slow blood dull the vermilion, in patches and most outside; wet inside it stays red
