@@ -27,10 +27,11 @@ BEHIND_MM = 3.0  # so far behind the ball's front a ray has to come for it to ha
 CONTACT = 0.94  # of the base mesh's ball: where its lids' edges lie
 LEAVES = -0.5  # of the radius: there edges leave the ball towards the inner corner
 CORNER_MM = 0.5  # that the inner corner is set back
-#: Where skin about the inner corner is smoothed: (x, y) mm from the corner, fully within a radius,
-#: not beyond another, how often. Below the corner folds are pushed together, beside it the nose's
-#: wall.
-EASED = (((-1.5, -3.0), 3.5, 9.0, 40), ((-5.0, 1.5), 3.5, 9.5, 320))
+#: Where skin about the inner and the outer corner is smoothed: (x, y) mm from the corner, fully
+#: within a radius, not beyond another, how often. Below the inner one folds are pushed together,
+#: beside it the nose's wall; beside the outer one the upper lid's fold ends over a pocket.
+EASED_INNER = (((-1.5, -3.0), 3.5, 9.0, 40), ((-5.0, 1.5), 3.5, 9.5, 320))
+EASED_OUTER = (((3.5, 5.0), 3.0, 7.5, 90),)
 CLEAR_MM = 0.05  # of skin from the ball
 LATERAL_MM = 0.8  # of the outer corner from the ball's side
 UPPER_SHARE = 0.62  # of the opening's height, above the line between the corners
@@ -341,19 +342,22 @@ def clear(points: np.ndarray, ball: Eyeball, own: Eyes, gaze: np.ndarray) -> np.
 
 
 def _eased(points: np.ndarray, faces: np.ndarray, shape: _Shape) -> np.ndarray:
-    """Points (N, 3) with the skin beside and below the inner corner smoothed: folds of the base
-    mesh are pushed together there.
+    """Points (N, 3) with the skin beside both corners and below the inner one smoothed: folds of
+    the base mesh are pushed together there.
     """
     local = (points - shape.ball.centre) * [shape.side, 1, 1]
     low, high = shape.goal(local[:, 0])
     above = np.maximum(local[:, 1] + shape.line - high, low - local[:, 1] - shape.line)
-    away = np.maximum(above, shape.medial - local[:, 0])  # from the opening
-    corner = np.array([shape.medial, shape.corners[0] - shape.line])
+    beside = np.maximum(shape.medial - local[:, 0], local[:, 0] - shape.lateral)
+    away = np.maximum(above, beside)  # from the opening
+    corners = zip((shape.medial, shape.lateral), shape.corners, strict=True)
     result = points.copy()
-    for offset, full, none, rounds in EASED:
-        share = 1 - smoothstep(full, none, np.linalg.norm(local[:, :2] - corner - offset, axis=1))
-        share *= smoothstep(1.0, 2.2, away) * (local[:, 2] > 0)
-        result = _smoothed(result, faces, share, rounds)
+    for (x, y), places in zip(corners, (EASED_INNER, EASED_OUTER), strict=True):
+        for offset, full, none, rounds in places:
+            place = np.array([x, y - shape.line]) + offset
+            share = 1 - smoothstep(full, none, np.linalg.norm(local[:, :2] - place, axis=1))
+            share *= smoothstep(1.0, 2.2, away) * (local[:, 2] > 0)
+            result = _smoothed(result, faces, share, rounds)
     return result
 
 

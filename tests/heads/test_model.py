@@ -167,6 +167,19 @@ def test_the_upper_lids_fold_hangs_over_its_crease():
     assert still.sum() > 5 and np.abs(moved[still]).max() < 0.1
 
 
+def test_no_pocket_lies_beside_the_outer_corners(anatomy):
+    """A lamp outwards, above and before lights all skin between the corner and the brow's end."""
+    for ball, opening in zip(anatomy.eyes, anatomy.openings, strict=True):
+        side = np.sign(ball.centre[0])
+        x, y, _ = ((anatomy.fine.positions - ball.centre) * [side, 1, 1]).T
+        z = anatomy.fine.positions[:, 2] - ball.centre[2]
+        end = -1 if side > 0 else 0
+        x, y = x - side * opening.x[end], y - opening.upper[end]
+        beside = (np.hypot(x - 4.5, y - 5.0) < 2.5) & (z > -2)
+        facing = anatomy.fine.normals[beside] @ [side * 0.57, 0.57, 0.59]
+        assert beside.sum() > 20 and facing.min() > 0.15
+
+
 def test_edge_maps_are_distances_to_the_lids(anatomy):
     opening = anatomy.openings[0]
     edges = opening.edge_map()
