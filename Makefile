@@ -85,7 +85,7 @@ JPEG = .venv/bin/python -c 'import sys; from PIL import Image; Image.open(sys.ar
 gallery: setup
 	$(SUBDERMAL) build stimuli/studies/thesis.toml --out build/thesis
 	$(SUBDERMAL) strip build/thesis --crop 270x270+830+540 --crop 270x300+1520+365 --out docs/close-up.png
-	$(SUBDERMAL) compare thesis -t all -t golubev:samples=256 -f close-up --size 480x270 --crop 270x110+180+95 --walks 64 --set materials.head.tarsus=0 --set materials.head.lip_muscle=0 --set materials.head.cartilage=0 --out docs/reference/close-up.png
+	$(SUBDERMAL) compare thesis -t all -t golubev:samples=256 -f close-up --size 480x270 --crop 270x110+180+95 --walks 64 --set materials.head.tarsus=0 --set materials.head.lip_muscle=0 --set materials.head.nose_wing=0 --set materials.head.cartilage=0 --out docs/reference/close-up.png
 	$(SUBDERMAL) compare docs/scenes/bars.toml -t deon_luebke:texturing=0 --against jimenez_gaussian:texturing=0 --size 480x270 --out docs/scenes/bars.png
 	$(SUBDERMAL) compare docs/scenes/spots.toml -t jimenez_separable:jitter=false -t jimenez_separable -t golubev --against deon_luebke --size 480x180 --columns 2 --out docs/scenes/spots.png
 	$(SUBDERMAL) render --scene docs/scenes/maps.toml -t golubev --size 1280x336 --out docs/scenes/maps.png

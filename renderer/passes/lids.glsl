@@ -33,11 +33,14 @@ float through_lid(vec3 local) { return 1.0 - tarsus * (1.0 - smoothstep(3.0, 6.0
 // And through a lip, of whose mask 0.5 is the border and 1 the seam: it is muscle below a thin vermilion.
 uniform float lip_muscle;
 float through_lip(float mask) { return 1.0 - lip_muscle * smoothstep(0.45, 0.75, mask); }
+// And through a nostril's wing, 4 to 6 mm of fat and fibres that stand thinner here, seen from its lining, of which `inside` says how deep it lies.
+uniform float nose_wing;
+float through_wing(float inside) { return (1.0 - inside) * (1.0 - nose_wing * smoothstep(0.0, 0.05, inside)); }
 // And through an ear: all of it but the lobe is a plate of cartilage between two thin skins. local: mm; the ears: their middles.
 uniform float cartilage; uniform vec3 ear_l; uniform vec3 ear_r;
 float through_ear(vec3 local) {
     vec3 to_l = local - ear_l, to_r = local - ear_r, off = dot(to_l, to_l) < dot(to_r, to_r) ? to_l : to_r;
     return 1.0 - cartilage * (1.0 - smoothstep(40.0, 50.0, length(off))) * smoothstep(-22.0, -12.0, off.y);
 }
-// All of it: the share of what comes through to a place that is left. lip: the mask; inside: 1 within the mouth.
-float through_flesh(vec3 local, float lip, float inside) { return (1.0 - inside) * through_lid(local) * through_lip(lip) * through_ear(local); }
+// All of it: the share of what comes through to a place that is left. lip: the mask; inside: 1 within the mouth and the nostrils.
+float through_flesh(vec3 local, float lip, float inside) { return through_wing(inside) * through_lid(local) * through_lip(lip) * through_ear(local); }

@@ -47,6 +47,8 @@ FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, GL.GL_R32F)
 #: world.
 PLACED_FORMATS = (GL.GL_RGBA32F, _HALF, _HALF, _HALF, _HALF, GL.GL_RGBA32F)
 
+#: Shares of light from behind that a skin's fields stop (passes/lids.glsl).
+STOPS = ("tarsus", "lip_muscle", "nose_wing", "cartilage")
 #: Fields of a skin that passes/skin.frag takes under their own names.
 SKIN_UNIFORMS = (
     "melanin",
@@ -334,7 +336,7 @@ class Surfaces:
         textures += [self._no_edges] * (2 - len(textures))
         return {
             "lid_count": len(eyes),
-            **{name: getattr(skin, name) for name in ("tarsus", "lip_muscle", "cartilage")},
+            **{name: getattr(skin, name) for name in STOPS},
             **{name: marks.get(name, nowhere) for name in ("ear_l", "ear_r")},
             "lid_ball": np.array(balls + [[0.0, 0.0, 0.0, 1.0]] * (2 - len(balls))),
             "edges_a": textures[0],

@@ -221,6 +221,11 @@ class Skin(Material):
     cartilage: float = parameter(
         0.5, source="of what comes through an ear, that its cartilage stops, by eye", **_SHARE
     )
+    nose_wing: float = parameter(
+        0.95,
+        source="of what comes through a nostril's wing, that its fat and fibres stop, by eye",
+        **_SHARE,
+    )
     freckles: float = parameter(
         0.035, unit="share of melanin more", low=0.0, high=0.6, source="by eye"
     )

@@ -171,7 +171,8 @@ class Form(Parameters):
     the vermilion's border, lip_ridge_width_mm wide; vermilion_mm: heights of the upper and the
     lower lip's red in the middle, 0 leaves the mesh's. nostril_mm: how deep the nostrils are, 0
     leaves them closed; nostril_long: their length, of the mesh's own dent's; nostril_wide: their
-    width, of the length; nostril_arch_mm: how far the wing's margin rises over them.
+    width, of the length; nostril_wall: how far from their middle they are full deep, so that their
+    walls are steeper the more it is; nostril_arch_mm: how far the wing's margin rises over them.
     """
 
     called: ClassVar[str] = "form"
@@ -192,6 +193,9 @@ class Form(Parameters):
     nostril_mm: float = parameter(6.0, unit="mm", low=0.0, high=12.0, source="by eye")
     nostril_long: float = parameter(0.92, low=0.5, high=1.6, source="1 is about 9 mm")
     nostril_wide: float = parameter(0.50, low=0.2, high=1.2, source="by eye")
+    nostril_wall: float = parameter(
+        0.20, unit="of the half axes", low=0.0, high=0.8, source="by eye"
+    )
     nostril_arch_mm: float = parameter(1.0, unit="mm", low=-1.0, high=4.0, source="by eye")
     relief: dict[str, Any] = field(default_factory=dict)
 

@@ -11,7 +11,6 @@ from stimuli.heads.smooth import smoothstep
 #: Front and back end of the left one on the base mesh without targets, x and z, y above the eyes.
 ENDS_MM = ((7.4, -43.0, 160.6), (12.4, -43.5, 152.6))
 BORE = (0.0, 0.94, -0.34)  # which way it leads
-WALL = 0.20  # of the half axes: where the rim begins to turn in
 ABOUT_MM = 5.0  # of the opening along its bore: what lies farther off is lip or the nose's back
 REACH = 2.6  # half axes: farther off nothing is moved
 
@@ -66,7 +65,7 @@ def opened(
         close = (r < REACH) & (np.abs(along) < 2 * ABOUT_MM)
         about = smoothstep(0, 1, (ABOUT_MM - np.abs(along)) / 1.5)
         share = about * smoothstep(0, 1, (0.35 - normals @ axes[2]) / 0.3)
-        share *= smoothstep(0, 1, (1.0 - r) / (1.0 - WALL)) * close
+        share *= smoothstep(0, 1, (1.0 - r) / (1.0 - form.nostril_wall)) * close
         # the margin of the wing, both its skin and its lining
         margin = np.exp(-(((r - 1.15) / 0.75) ** 2)) * smoothstep(0, 1, (out - 0.1) / 0.7)
         margin *= np.exp(-((along / 4.0) ** 2)) * smoothstep(0, 1, (REACH - r) / 0.8) * close

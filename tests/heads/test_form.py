@@ -90,6 +90,18 @@ def test_nostrils_are_open_and_as_deep_as_their_field(folded):
     assert dark[folded.fine.normals @ bore > 0.75].max() == 0
 
 
+def test_nostrils_with_a_wide_floor_have_steep_walls(folded):
+    """Vertices between the floor and the rim lie deeper, those of the floor and the rim do not."""
+    wide = build(Form(folds=0.0, bones=0.0, asymmetry=0.0, wander_mm=0.0, nostril_wall=0.6)).fine
+    same = build(Form(folds=0.0, bones=0.0, asymmetry=0.0, wander_mm=0.0)).fine
+    bore = np.array([0.0, 0.94, -0.34]) / np.hypot(0.94, 0.34)
+    deeper = (wide.positions - same.positions) @ bore
+    dark = same.masks["nostrils"]
+    between = (dark > 0.4) & (dark < 0.9)
+    assert deeper[between].max() > 0.8 and deeper.min() > -1e-9
+    assert np.abs(deeper[dark == 0]).max() < 0.2
+
+
 def test_an_expression_moves_its_side_by_its_millimetres():
     data = fetch.mpfb_data()
     base = mpfb.read_base(data).positions

@@ -88,13 +88,14 @@ def test_no_more_light_is_sent_back_than_comes():
     assert 0.5 < specular.mean() < 1 and specular.max() < 1.005
 
 
-def through(cartilage, ear):
+def through(cartilage=0.0, ear=None, **skin):
     """Light (3,) that comes through the middle of a slab 3 mm thick, lit from behind, where an
     ear's middle lies at ear (3,) mm from it, or is nowhere.
     """
+    skin = {"kind": "skin", "medium": "skin", "cartilage": cartilage, **skin}
     table = {
         "objects": {"slab": {"shape": "slab", "size_mm": [24.0, 24.0, 3.0]}},
-        "materials": {"slab": {"kind": "skin", "medium": "skin", "cartilage": cartilage}},
+        "materials": {"slab": skin},
         "lights": {"sun": {"direction": [0.0, 0.0, -1.0], "irradiance": [20.0] * 3}},
         "camera": {"framing": "slab", "height_mm": 6.0, "angle": "front"},
     }
@@ -116,6 +117,14 @@ def test_cartilage_stops_light_in_an_ear_but_not_in_its_lobe_nor_elsewhere():
     np.testing.assert_allclose(through(0.6, np.array([0.0, -5.0, 0.0])), 0.4 * plain, rtol=0.02)
     np.testing.assert_allclose(through(0.0, np.array([0.0, -5.0, 0.0])), plain, rtol=0.01)
     np.testing.assert_allclose(through(0.6, np.array([0.0, 30.0, 0.0])), plain, rtol=0.01)
+
+
+def test_a_nostrils_wing_stops_light_on_its_lining_but_not_on_skin():
+    plain = through()
+    lining = {"masks": {"inside": 0.4}}
+    np.testing.assert_allclose(through(nose_wing=0.0, **lining), 0.6 * plain, rtol=0.01)
+    np.testing.assert_allclose(through(nose_wing=0.9, **lining), 0.06 * plain, rtol=0.02)
+    np.testing.assert_allclose(through(nose_wing=0.9), plain, rtol=0.01)
 
 
 OILY = {"masks": {"oil": 0.7, "pores": 0.3}, "oil_patches": 0.0}
