@@ -11,7 +11,7 @@ import numpy as np
 from renderer.scene import Eye
 from renderer.scene.cornea import normals, reach
 from renderer.scene.model import EYE_VALUES
-from stimuli.heads.lids import MAP_MM, Eyeball, Opening
+from stimuli.heads.lids import MAP_MM, RIM_MM, Eyeball, Opening, depths
 from stimuli.heads.person import Eyes
 from stimuli.heads.smooth import smoothstep
 from stimuli.heads.subdivide import vertex_normals
@@ -19,7 +19,11 @@ from stimuli.heads.vessels import vessel_map
 
 RINGS, SEGMENTS = 96, 96
 ACROSS, UP = 44, 30  # vertices of the sheet in the corner
+REACH, FALL = 0.50, 0.135  # of the radius: how far the sheet goes from the corner, and back
+UNDER_MM = 0.8  # its end lies so far under the ball at least
 PLICA_MM, PALE = (0.0, 1.7), 0.02  # above the ball, where it pales; how much flesh is left there
+LINED, LINING, ROWS = 0.42, 120, 6  # of the opening, from the nose: there it begins; vertices
+BESIDE_MM = 0.6  # of the opening: there a lining begins, below the lids' rims
 COLOURS = ("iris", "fibres", "collarette", "sclera")
 
 
@@ -29,9 +33,17 @@ def values_of(own: Eyes) -> dict[str, float]:
 
 
 def eyeball(
-    ball: Eyeball, own: Eyes | None = None, opening: Opening | None = None, seed: int = 0
+    ball: Eyeball,
+    own: Eyes | None = None,
+    opening: Opening | None = None,
+    seed: int = 0,
+    rims: np.ndarray | None = None,
 ) -> Eye:
-    """An eye before an opening, or behind none; seed: of its vessels. Rings crowd to the front."""
+    """An eye before an opening, or behind none; seed: of its vessels. Rings crowd to the front.
+
+    rims (LINING, 3): where a lining between lids and ball begins (`rims`), for lids that were not
+    made for the ball.
+    """
     own = own or Eyes()
     gaze = own.direction
     theta = np.pi * np.linspace(0, 1, RINGS) ** 1.5 * 0.999 + 1e-4
@@ -56,6 +68,12 @@ def eyeball(
         faces = np.vstack([faces, sheet + len(positions)])
         positions = np.vstack([positions, more])
         normal = np.vstack([normal, vertex_normals(more, sheet)])
+        tissue = np.vstack([tissue, own_tissue])
+    if rims is not None:
+        more, own_tissue, wall = lining(ball, rims)
+        faces = np.vstack([faces, wall + len(positions)])
+        positions = np.vstack([positions, more])
+        normal = np.vstack([normal, vertex_normals(more, wall)])
         tissue = np.vstack([tissue, own_tissue])
     return Eye(
         positions.astype(np.float32),
@@ -95,13 +113,15 @@ def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.n
     x_in = side * (opening.x[0] if side > 0 else opening.x[-1])  # the inner corner, below 0
     deep = opening.corners[0 if side > 0 else 1]
     # from behind the corner to where it is well inside the ball
-    x = np.linspace(x_in - 0.8, x_in + 0.50 * ball.radius, ACROSS)
+    x = np.linspace(x_in - 0.8, x_in + REACH * ball.radius, ACROSS)
     low, high = opening.at(side * x)
     v = np.linspace(0, 1, UP)
     y = (low - 1.3)[:, None] + v[None] * (high - low + 2.6)[:, None]
     x = np.repeat(x[:, None], UP, axis=1)
-    along = (x - x_in) / ball.radius
-    z = deep - 1.2 - 0.27 * ball.radius * along
+    along = (x - x_in) / (REACH * ball.radius)
+    flat = x[-1, 0] ** 2 + max(low[-1] ** 2, high[-1] ** 2)
+    end = np.sqrt(max(ball.radius**2 - flat, 0.0)) - UNDER_MM
+    z = deep - 1.2 - max(FALL * ball.radius, deep - 1.2 - end) * along
     z = z + 0.28 * np.sin(1.7 * y + 0.8) + 0.12 * np.sin(3.7 * y + 2.0)  # its border winds
     middle = np.interp(x_in, side * opening.x[:: int(side)], opening.lower[:: int(side)])
     size = 1.0 * own.caruncle
@@ -122,3 +142,41 @@ def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.n
     lump = np.clip(1.2 * lump, 0, 1)
     tissue = np.stack([np.maximum(flesh, lump), lump], axis=2).reshape(-1, 2)
     return ball.centre + local, tissue
+
+
+def rims(
+    positions: np.ndarray, faces: np.ndarray, ball: Eyeball, opening: Opening
+) -> np.ndarray | None:
+    """Below the rims of a mesh's (N, 3), (M, 3) lids, from the upper one's middle round the outer
+    corner to the lower one's: (LINING, 3) mm; None where its skin is not all there.
+    """
+    side = 1.0 if ball.centre[0] > 0 else -1.0
+    inner, outer = opening.x[:: int(side)][[0, -1]]
+    t = np.abs(np.linspace(-1, 1, LINING))  # 0 at the corner
+    x = outer + (1 - LINED) * (inner - outer) * t**2
+    edge = np.where(np.arange(LINING) < LINING // 2, *opening.at(x)[::-1])
+    along = np.gradient(np.column_stack([x, edge]), axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    size = ball.radius / Eyes().radius_mm
+    beside = np.column_stack([x, edge]) + BESIDE_MM * size * side * along[:, ::-1] * [-1, 1]
+    deep = depths(positions, faces, ball, *beside.T)
+    if deep is None or not np.isfinite(deep).all():
+        return None
+    return ball.centre + np.column_stack([beside, deep - RIM_MM * size])
+
+
+def lining(ball: Eyeball, rims: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What lines the outer half of an opening, from below the lids' rims (LINING, 3) into the ball,
+    so that no gap is seen beside it: points (LINING ROWS, 3) mm, their tissue, triangles.
+    """
+    local = rims - ball.centre
+    distance = np.linalg.norm(local, axis=1, keepdims=True)
+    into = np.minimum(distance, ball.radius) - 0.5
+    share = np.linspace(0, 1, ROWS)[None, :, None]
+    points = (local / distance)[:, None] * (distance[:, None] + share * (into - distance)[:, None])
+    faces = _grid(LINING, ROWS, False)
+    flesh = np.repeat(PALE + (1 - PALE) * (1 - share[..., 0]), LINING, axis=0)
+    tissue = np.stack([flesh, np.zeros_like(flesh)], axis=2).reshape(-1, 2)
+    if ball.centre[0] > 0:
+        faces = faces[:, ::-1]
+    return ball.centre + points.reshape(-1, 3), tissue, faces

@@ -34,6 +34,10 @@ EASED_INNER = (((-1.5, -3.0), 3.5, 9.0, 40), ((-5.0, 1.5), 3.5, 9.5, 320))
 EASED_OUTER = (((3.5, 5.0), 3.0, 7.5, 90),)
 CLEAR_MM = 0.05  # of skin from the ball
 LATERAL_MM = 0.8  # of the outer corner from the ball's side
+OUTWARD_MM = (0.5, 2.2)  # of the pupil from the opening's middle, least and most
+SEATED = 0.1  # share of a lid's edges that may lie deeper than the ball's surface and their rim's
+RIM_MM = 0.7  # of a lid's rim seen from the front, before what lies on the ball
+BESIDE_MM = (0.15, 0.3, 0.45, 0.6, 0.75)  # of the opening: where its edges' depth is looked up
 UPPER_SHARE = 0.62  # of the opening's height, above the line between the corners
 UPPER, LOWER = (1.05, 1.0), (1.25, 0.95)  # powers of the distance from either corner, nose first
 CREASE_SOFT_MM, CREASE_HALF_MM = 1.0, 0.4  # over which the fold rises; half the crease's width
@@ -105,28 +109,40 @@ class Opening:
         return np.stack(maps, axis=2).astype(np.float32)
 
 
-def opening(positions: np.ndarray, faces: np.ndarray, ball: Eyeball) -> Opening | None:
-    """The opening before a ball in a mesh (N, 3), (M, 3); None where the lids are closed.
-
-    Looked at from the front, the opening is where nothing is met near the ball's front.
+def depths(
+    positions: np.ndarray, faces: np.ndarray, ball: Eyeball, x: np.ndarray, y: np.ndarray
+) -> np.ndarray | None:
+    """How far before the ball's centre a mesh (N, 3), (M, 3) is first met from the front at x, y
+    (...) of the ball's frame, mm; -inf where it is not, None where no mesh is near.
     """
     import trimesh
-    from scipy.ndimage import label
 
     near = np.linalg.norm(positions - ball.centre, axis=1) < 2.2 * ball.radius
     part = faces[near[faces].all(axis=1)]
     if not len(part):
         return None
     mesh = trimesh.Trimesh(positions - ball.centre, part, process=False, validate=False)
-    half = 1.5 * ball.radius
-    axis = np.arange(-half, half + STEP_MM, STEP_MM)
-    x, y = np.meshgrid(axis, axis)
     start = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 4 * ball.radius)])
     hit = mesh.ray.intersects_first(start, np.tile([0.0, 0.0, -1.0], (len(start), 1)))
     normal, corner = mesh.face_normals[hit], mesh.triangles[hit, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = corner[:, 2] + ((corner - start)[:, :2] * normal[:, :2]).sum(axis=1) / normal[:, 2]
-    depth = np.where(hit >= 0, depth, -np.inf).reshape(x.shape)
+    return np.where(hit >= 0, depth, -np.inf).reshape(x.shape)
+
+
+def opening(positions: np.ndarray, faces: np.ndarray, ball: Eyeball) -> Opening | None:
+    """The opening before a ball in a mesh (N, 3), (M, 3); None where the lids are closed.
+
+    Looked at from the front, the opening is where nothing is met near the ball's front.
+    """
+    from scipy.ndimage import label
+
+    half = 1.5 * ball.radius
+    axis = np.arange(-half, half + STEP_MM, STEP_MM)
+    x, y = np.meshgrid(axis, axis)
+    depth = depths(positions, faces, ball, x, y)
+    if depth is None:
+        return None
     front = np.sqrt(np.maximum(ball.radius**2 - x**2 - y**2, 0))
     parts, count = label(depth < front - BEHIND_MM)
     if not count:
@@ -149,6 +165,41 @@ def opening(positions: np.ndarray, faces: np.ndarray, ball: Eyeball) -> Opening 
     if not np.isfinite(ends).all():
         return None
     return _smooth(axis[columns], low, high, (ends[0], ends[1]))
+
+
+def seated(positions: np.ndarray, faces: np.ndarray, ball: Eyeball) -> Eyeball:
+    """A ball that is roughly in its socket, moved so that the lids of a mesh (N, 3), (M, 3) lie on
+    it as on a person's: its side at the outer corner, its pupil as far below the upper lid as the
+    default eye's, its front behind the edges' rims. As it is where no opening is found.
+    """
+    own, radius = Eyes(), ball.radius
+    size = radius / own.radius_mm
+    for _ in range(3):
+        found = opening(positions, faces, ball)
+        if found is None:
+            return ball
+        side = 1.0 if ball.centre[0] > 0 else -1.0
+        outer, middle = found.x[-1 if side > 0 else 0], 0.5 * (found.x[0] + found.x[-1])
+        x = side * outer - (radius - LATERAL_MM * size)
+        x = side * np.clip(x - side * middle, *(size * mm for mm in OUTWARD_MM)) + middle
+        lower, upper = (float(edge) for edge in found.at(x))
+        y = upper - own.mrd1_mm / own.opening_height_mm * (upper - lower)
+        # where both edges would touch a ball at x, y: from the pupil outwards, since the inner
+        # corner lies off it
+        across = x + side * np.linspace(-0.35, 0.7, 24) * radius
+        touch = []
+        for edge, away in zip(found.at(across), (-1, 1), strict=True):
+            rows = edge + away * size * np.array(BESIDE_MM)[:, None]
+            deep = depths(positions, faces, ball, np.broadcast_to(across, rows.shape), rows)
+            flat = radius**2 - (across - x) ** 2 - (edge - y) ** 2
+            touch.append(deep.min(axis=0) - np.sqrt(np.maximum(flat, 0)))
+        touch = np.concatenate(touch)
+        lids = touch[touch > -BEHIND_MM]  # what is deeper is the socket
+        if not len(lids):
+            return ball
+        z = np.quantile(lids, SEATED) - RIM_MM * size
+        ball = Eyeball(ball.centre + [x, y, z], radius)
+    return ball
 
 
 def _smooth(
@@ -326,13 +377,14 @@ def _folded(points: np.ndarray, shape: _Shape, own: Eyes) -> np.ndarray:
 
 def clear(points: np.ndarray, ball: Eyeball, own: Eyes, gaze: np.ndarray) -> np.ndarray:
     """Points (N, 3) of skin pushed out of the eye along its radii, so that a lid lies over the
-    cornea too; what is above moves with it and less.
+    cornea too, in each gaze (..., 3); what is above moves with it and less.
     """
     local = points - ball.centre
     distance = np.linalg.norm(local, axis=1)
     near = distance < ball.radius + 8.0
     unit = local[near] / np.maximum(distance[near], 1e-9)[:, None]
-    surface = reach(unit @ gaze, ball.radius, own.iris_mm) + CLEAR_MM
+    nearest = (unit @ np.atleast_2d(gaze).T).max(axis=1, initial=-1.0)
+    surface = reach(nearest, ball.radius, own.iris_mm) + CLEAR_MM
     bulge = surface - CLEAR_MM - ball.radius
     height = distance[near] - ball.radius
     new = distance[near] + bulge * (1 - smoothstep(1.5, 8.0, height)) * (height > -2.0)

@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from renderer.scene import MASKS, Material, Model, Proxy, Surface
+from renderer.scene import MASKS, Eye, Material, Model, Proxy, Surface
 from stimuli.heads import eyes, template
 from stimuli.heads.formats import decode_srgb
-from stimuli.heads.lids import Eyeball, opening
+from stimuli.heads.lids import Eyeball, clear, opening, seated
+from stimuli.heads.person import Eyes
+from stimuli.heads.subdivide import vertex_normals
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
 CLUSTER_MM = 3.0
@@ -20,8 +22,8 @@ MATCH_MM = (
     12.0  # how far apart surfaces count that face a radian apart, where masks are carried over
 )
 EYE_MM = 12.0  # radius of a ball, for an average head
-LID_MM = 1.0  # thickness of a lid
-OUTWARD_MM = 1.5  # of the opening's middle, where the pupil stands (people's `[eyes]`)
+LOOK_DEG = (-30.0, -20.0, -10.0, 0.0, 10.0, 20.0, 30.0)  # to where lids are kept off the cornea
+DEEP_MM = 3.0  # what lies so far inside a ball is its socket, no lid
 OPEN_MM = 4.0  # so far behind the face about it a socket is open
 LEVELS = 3  # of subdivision, at most
 FINE_LIMIT = 250_000  # faces: no finer above
@@ -129,10 +131,11 @@ def _masks(scan, p: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def _sockets(p, faces, marks, scale: float) -> tuple[Eyeball, ...]:
-    """The balls that open sockets want, left of the person first; none where one of both is closed.
+    """Roughly, the balls that open sockets want, left of the person first; none where one of both
+    is closed.
 
-    Looked at from the front, a socket is where nothing is met near the lids' depth. A ball lies a
-    little outwards of the opening's middle and behind its rim, so that the lids lie on it.
+    Looked at from the front, a socket is where nothing is met near the lids' depth. A ball lies
+    in the opening's middle and behind its rim.
     """
     import trimesh
     from scipy.ndimage import binary_dilation, label
@@ -159,15 +162,13 @@ def _sockets(p, faces, marks, scale: float) -> tuple[Eyeball, ...]:
             return ()
         rim = binary_dilation(own, iterations=2) & ~open_ & np.isfinite(depth)
         tall = own.sum(axis=0)
-        ends = across[0, np.flatnonzero(tall > 0.3 * tall.max())[[0, -1]]]
-        x = ends.mean() + np.sign(marks[name][0]) * OUTWARD_MM * scale
+        x = across[0, np.flatnonzero(tall > 0.3 * tall.max())[[0, -1]]].mean()
         y = down[own].mean()
         beside = (across[rim] - x) ** 2 + (down[rim] - y) ** 2
         near = beside < (0.95 * radius) ** 2
         if near.sum() < 10:
             return ()
-        lids = np.quantile(depth[rim][near] - np.sqrt(radius**2 - beside[near]), 0.25)
-        z = lids - LID_MM * scale
+        z = np.quantile(depth[rim][near] - np.sqrt(radius**2 - beside[near]), 0.25)
         place = np.array([marks[name][0] + x, marks[name][1] + y, z])
         balls.append(Eyeball(place, float(radius)))
     return tuple(balls)
@@ -183,6 +184,33 @@ def _smooth(depth: np.ndarray) -> np.ndarray:
         off = np.where(np.isfinite(depth), depth - plane, -np.inf)
         good = off > np.quantile(off[np.isfinite(off)], 0.3)
     return plane
+
+
+def _over_the_balls(
+    positions: np.ndarray, normals: np.ndarray, faces: np.ndarray, balls: tuple[Eyeball, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and normals (N, 3) with the lids moved out of the balls and of the cornea."""
+    own, turns = Eyes(), np.radians(LOOK_DEG)
+    gazes = np.column_stack([np.sin(turns), np.zeros(len(turns)), np.cos(turns)])
+    new = positions.copy()
+    for ball in balls:
+        lids = np.linalg.norm(new - ball.centre, axis=1) > ball.radius - DEEP_MM
+        new[lids] = clear(new[lids], ball, own, gazes)
+    moved = (new != positions).any(axis=1)
+    if moved.any():
+        # seams of the texture part no lid
+        _, first, same = np.unique(positions, axis=0, return_index=True, return_inverse=True)
+        welded = same.ravel()[faces]
+        smooth = vertex_normals(new[first], welded)[same.ravel()]
+        normals = np.where(moved[:, None], smooth, normals)
+    return new, normals
+
+
+def _eye(positions: np.ndarray, faces: np.ndarray, ball: Eyeball) -> Eye:
+    """The default head's eye in a socket, lined where the lids do not touch it."""
+    seen = opening(positions, faces, ball)
+    rims = None if seen is None else eyes.rims(positions, faces, ball, seen)
+    return eyes.eyeball(ball, None, seen, rims=rims)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -278,6 +306,9 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     positions, normals, uvs, faces, carry = _finer(positions, normals, uvs, faces, edge_mm)
     if len(positions) > coarse:
         proxy = replace(proxy, to_full=(carry @ proxy.to_full).tocsr())
+    if eye_points is None:
+        balls = tuple(seated(positions, faces, ball) for ball in balls)
+    positions, normals = _over_the_balls(positions, normals, faces, balls)
     masks = _masks(scan, positions, normals)
     near = _masks(scan, proxy.positions, proxy.normals)
     own = {
@@ -298,7 +329,7 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     )
     return Model(
         surface,
-        tuple(eyes.eyeball(ball, None, opening(positions, faces, ball)) for ball in balls),
+        tuple(_eye(positions, faces, ball) for ball in balls),
         None,
         _landmarks(scan, positions, eye_points, balls),
         material=Material(albedo=tuple(float(v) for v in colour)),

@@ -260,6 +260,70 @@ def test_a_scan_renders(tmp_path):
     assert (result.samples > 0).mean() > 0.05 and result.image[result.samples > 0].mean() > 40
 
 
+def test_an_open_socket_gets_a_ball_where_its_lids_lie():
+    """On a head whose balls are known, cut off by what a file keeps: its surface."""
+    from stimuli.heads import eyes, scan_model, subdivide
+    from stimuli.heads.lids import Eyeball, opening, seated
+    from tests.heads import awkward
+
+    positions, faces, marks = awkward.head("woman")
+    near = np.linalg.norm(positions - marks["eye_r"], axis=1) < 45
+    used, faces = np.unique(faces[near[faces].all(axis=1)], return_inverse=True)
+    positions, faces = positions[used], faces.reshape(-1, 3)
+    normals = subdivide.vertex_normals(positions, faces)
+    positions, normals, _, faces, _ = scan_model._finer(
+        positions, normals, np.zeros((len(used), 2)), faces, 2.5
+    )
+    rough = Eyeball(marks["eye_r"] + [2.5, -3.5, -1.0], 12.0)
+    ball = seated(positions, faces, rough)
+    assert np.abs(ball.centre - marks["eye_r"]).max() < 0.5
+    before = positions.copy()
+    positions, normals = scan_model._over_the_balls(positions, normals, faces, (ball,))
+    moved = np.linalg.norm(positions - before, axis=1)
+    away = np.linalg.norm(before - ball.centre, axis=1)
+    assert 0.1 < moved.max() < 2.5 and not moved[away > ball.radius + 8].any()
+    # wherever the eye looks no lid lies within the cornea
+    eye = scan_model._eye(positions, faces, ball)
+    local = positions - ball.centre
+    away = np.linalg.norm(local, axis=1)
+    lids = away > ball.radius - scan_model.DEEP_MM
+    for gaze in ([0.0, 0.0, 1.0], [0.5, 0.0, np.sqrt(0.75)]):
+        front = cornea.reach(local @ gaze / away, ball.radius, eye.iris_radius)
+        assert (away > front)[lids].all()
+    # beside the ball nobody looks into the socket: what is met first is met from the front too
+    bare = eyes.eyeball(ball, None, opening(positions, faces, ball))
+    assert _socket_seen(positions, faces, bare) > 20
+    assert _socket_seen(positions, faces, eye) == 0
+
+
+def _socket_seen(positions, faces, eye):
+    """How many of some rays from the nose's side end deep behind the lids of a right eye; the
+    undersides of their rims lie less than 2.5 mm behind.
+    """
+    skin = trimesh.Trimesh(positions - eye.centre, faces, process=False)
+    ball = trimesh.Trimesh(eye.positions - eye.centre, eye.faces, process=False)
+    away = np.array([np.sin(np.radians(40)), 0.0, -np.cos(np.radians(40))]) * [-1, 1, 1]
+    y, x = np.mgrid[-6:5:0.4, -14:4:0.4]
+    through = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 6.0)])
+    start = through - 100 * away
+    hits, index, _ = skin.ray.intersects_location(
+        start, np.tile(away, (len(start), 1)), multiple_hits=False
+    )
+    first = np.full(len(start), np.inf)
+    first[index] = ((hits - start[index]) * away).sum(axis=1)
+    met, index_eye, _ = ball.ray.intersects_location(
+        start, np.tile(away, (len(start), 1)), multiple_hits=False
+    )
+    nearer = np.full(len(start), np.inf)
+    nearer[index_eye] = ((met - start[index_eye]) * away).sum(axis=1)
+    seen = hits[(first < nearer)[index]]
+    seen = seen[np.linalg.norm(seen, axis=1) < 1.5 * eye.radius]
+    lid, index, _ = skin.ray.intersects_location(
+        seen + [0, 0, 0.3], np.tile([0, 0, 1.0], (len(seen), 1)), multiple_hits=False
+    )
+    return int(((lid - seen[index])[:, 2] > 2.5).sum())
+
+
 def write_parts(file, parts):
     """An OBJ of named groups (name, mesh)."""
     lines, start = [], 1
