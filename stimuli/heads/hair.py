@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
+from scipy.special import betaincinv
 
 from renderer.scene import MASKS, Strands
 from renderer.scene.shapes import points_on, triangle_areas
@@ -136,13 +137,20 @@ def _pack(points, width, colour, cover, vertex) -> dict:
     }
 
 
-def pigmented(own: Hair, tone: np.ndarray, grey: np.ndarray) -> np.ndarray:
-    """Colours (S, 3): the person's, lighter or darker by exp(tone) (S,), without pigment where
-    grey (S,) says so.
+def pigmented(own: Hair, tone: np.ndarray, drawn: np.ndarray, grey: float) -> np.ndarray:
+    """Colours (S, 3): the person's, lighter or darker by exp(tone) (S,), of which strands lack
+    their pigment by the share `grey` on average; drawn (S,): evenly in [0, 1].
+
+    Follicles cease one by one and over years, so that strands between full and bare are found
+    beside both: what a strand holds has a beta distribution, the more of one mind the larger
+    grey_mixed. A fibre absorbs by Beer's law: half the pigment leaves the root of the light.
     """
-    colours = np.array(own.colour) * np.exp(tone)[:, None]
-    bare = np.array(own.grey_colour) * np.exp(0.3 * tone)[:, None]
-    return np.clip(np.where(grey[:, None], bare, colours), 0.0, 0.95)
+    full = np.array(own.colour) * np.exp(tone)[:, None]
+    bare = np.array(own.grey_colour) * np.exp(own.grey_lightness * tone)[:, None]
+    if not 0 < grey < 1:
+        return np.clip(bare if grey else full, 0.0, 0.95)
+    held = betaincinv(own.grey_mixed * (1 - grey), own.grey_mixed * grey, drawn)[:, None]
+    return np.clip(full**held * np.minimum(bare, 0.95) ** (1 - held), 0.0, 0.95)
 
 
 def scalp_hair(
@@ -179,7 +187,7 @@ def scalp_hair(
             _pack(
                 points,
                 own.width_mm * rng.uniform(0.35, 0.65, count),
-                pigmented(own, tone, rng.random(count) < own.grey),
+                pigmented(own, tone, rng.random(count), own.grey),
                 np.full((count, POINTS), 0.1),
                 roots.vertex,
             )
@@ -260,10 +268,11 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
             curves[:, 2:-1] += 0.25 * (curves[:, 1:-2] - 2 * curves[:, 2:-1] + curves[:, 3:])
         curves, at = _out_of_the_head(curves, skin, 2)
     curves[:, 0] = p
-    width = own.width_mm * np.clip(1 + 0.13 * rng.normal(size=count), 0.6, 1.4)
+    width = own.width_mm * np.clip(1 + own.width_uneven * rng.normal(size=count), 0.4, 1.6)
     width *= 0.6 + 0.4 * smoothstep(0.05, 0.6, whole)
+    width[fly] *= own.fly_width  # they are the new and the broken ones
     tone = own.lightness * draw(0.35, 0.45, 0.8)
-    colours = pigmented(own, tone, rng.random(count) < own.grey)
+    colours = pigmented(own, tone, rng.random(count), own.grey)
     cover = growth.covered(curves, width / share, at[:, 1:])
     tip = np.full(count, 0.8 if length.mean() < 15 else 0.5)
     kept = ~alone_before_the_face(curves, eyes, share)
@@ -414,7 +423,7 @@ def brows(scalp: Scalp, eye_centres, rng: np.random.Generator, count: int, own: 
         packed = _pack(
             points,
             width * np.where(fine, 0.42, 1.0),
-            pigmented(own, tone, rng.random(many) < 0.6 * own.grey),
+            pigmented(own, tone, rng.random(many), own.brow_grey * own.grey),
             np.where(fine, 0.6, 0.3)[:, None] * np.ones(POINTS),
             roots.vertex,
         )
@@ -436,11 +445,11 @@ def stubble(scalp: Scalp, rng: np.random.Generator, count: int, own: Hair) -> di
     points = straight(
         roots, _tangential(flow, roots.normals), length, lift, 0.9 * lift * flat, rng, frizz=0.12
     )
-    grey = rng.random(count) < own.grey
+    drawn = rng.random(count)
     packed = _pack(
         points,
         rng.uniform(0.055, 0.095, count),
-        pigmented(own, np.log(1.2) + 1.2 * own.lightness * rng.normal(size=count), grey),
+        pigmented(own, np.log(1.2) + 1.2 * own.lightness * rng.normal(size=count), drawn, own.grey),
         np.clip(0.7 * flat[:, None] * (1 - np.linspace(0, 1, POINTS)), 0, 1),
         roots.vertex,
     )
@@ -518,4 +527,5 @@ def joined(parts: list[dict], own: Hair) -> Strands:
         first=np.concatenate([[0], np.cumsum(counts)]),
         root_vertex=np.concatenate([p["root_vertex"] for p in parts]).astype(np.int64),
         leaves_mm=own.leaves_mm,
+        spread_deg=own.spread_deg,
     )

@@ -166,8 +166,9 @@ class Lashes(Parameters):
 class Hair(Parameters):
     """Hair of head, brows, lids, beard and face; 0 strands: none.
 
-    colour: what two ways through a fibre leave of light, its melanin's absorption; a share `grey`
-    of the strands has none; lightness: standard deviation of the logarithm of a strand's colour.
+    colour: what two ways through a fibre leave of light, its melanin's absorption; the share `grey`
+    of it is lost, in some strands all and in others little (`grey_mixed`); lightness: standard
+    deviation of the logarithm of a strand's colour.
     style: a name of stimuli/hairstyles or a table (stimuli/heads/styles.py).
     """
 
@@ -180,6 +181,16 @@ class Hair(Parameters):
     grey_colour: tuple[float, float, float] = parameter(
         (0.46, 0.44, 0.40), source="by eye", **_COLOUR
     )
+    grey_mixed: float = parameter(
+        0.8,
+        unit="towards 0 strands are full or bare, above 2 most lie between",
+        low=0.01,
+        high=50.0,
+        source="by eye",
+    )
+    grey_lightness: float = parameter(
+        0.45, unit="of lightness, in bare strands", low=0.0, high=2.0, source="by eye"
+    )
     lightness: float = parameter(0.28, low=0.0, high=1.5, source="by eye")
     style: Style = nested(Style, default_factory=lambda: Style.read("side_part", "hair.style"))
     scalp: int = parameter(
@@ -187,6 +198,12 @@ class Hair(Parameters):
     )
     width_mm: float = parameter(
         0.072, unit="mm", low=0.01, high=0.2, source="Robbins 2012: 0.05 to 0.09"
+    )
+    width_uneven: float = parameter(
+        0.13, unit="standard deviation, of the width", low=0.0, high=0.5, source="by eye"
+    )
+    fly_width: float = parameter(
+        0.65, unit="of the width, of strands that fly", low=0.1, high=1.5, source="by eye"
     )
     scalp_length: float = parameter(
         1.0, unit="of the style's lengths", low=0.05, high=4.0, source="by eye"
@@ -204,12 +221,22 @@ class Hair(Parameters):
         high=1.0,
         source="Robbins 2012, scales wear and lift; by eye, on black hair",
     )
+    spread_deg: float = parameter(
+        7.5,
+        unit="degrees, standard deviation of the primary highlight",
+        low=2.0,
+        high=25.0,
+        source="Marschner et al. 2003: 5 to 10; more where scales are worn",
+    )
     brow_sheen: float = parameter(
         0.12,
         unit="of what whole scales mirror",
         low=0.0,
         high=1.0,
         source="of brows and beard, which lie in disorder; by eye",
+    )
+    brow_grey: float = parameter(
+        0.6, unit="of the scalp's grey", low=0.0, high=1.0, source="brows grey later; by eye"
     )
     leaves_mm: tuple[float, float] = parameter(
         (40.0, 140.0),

@@ -87,8 +87,32 @@ def test_cover_is_the_hair_outwards_of_a_point():
 
 def test_grey_strands_have_no_pigment():
     own = Hair.read({"grey": 1.0, "lightness": 0.0}, "hair")
-    colours = hair.pigmented(own, np.zeros(3), np.ones(3, bool))
+    colours = hair.pigmented(own, np.zeros(3), np.linspace(0, 1, 3), 1.0)
     np.testing.assert_allclose(colours, np.tile(own.grey_colour, (3, 1)))
+    colours = hair.pigmented(own, np.zeros(3), np.linspace(0, 1, 3), 0.0)
+    np.testing.assert_allclose(colours, np.tile(own.colour, (3, 1)))
+
+
+@pytest.mark.parametrize("mixed", [0.02, 0.8, 20.0])
+def test_strands_lose_the_share_of_their_pigment_that_is_asked_for(mixed):
+    """By Beer's law, on average; of two minds or of one."""
+    own = Hair.read({"grey": 0.7, "lightness": 0.0, "grey_mixed": mixed}, "hair")
+    drawn = (np.arange(4000) + 0.5) / 4000
+    colours = hair.pigmented(own, np.zeros(4000), drawn, own.grey)
+    full, bare = np.log(own.colour[1]), np.log(own.grey_colour[1])
+    held = (np.log(colours[:, 1]) - bare) / (full - bare)
+    assert held.mean() == pytest.approx(0.3, abs=0.005)
+    between = ((held > 0.1) & (held < 0.9)).mean()
+    assert between < 0.1 if mixed < 0.1 else between > (0.3 if mixed < 2 else 0.95)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("fly_width", 0.05), ("width_uneven", 0.6), ("spread_deg", 1.0), ("grey_mixed", 0.0)],
+)
+def test_how_strands_differ_has_bounds(field, value):
+    with pytest.raises(ValueError, match=rf"hair\.{field} is {value}"):
+        Hair.read({field: value}, "hair")
 
 
 @pytest.mark.parametrize(
