@@ -11,12 +11,11 @@ uniform sampler2D edges; uniform int has_edges;
 uniform sampler2D vessels; uniform float vessels_rad;
 uniform vec3 iris_base; uniform vec3 iris_fibres; uniform vec3 iris_collarette; uniform vec3 sclera_colour;
 uniform float pupil_mm; uniform float limbus_mm; uniform float limbus; uniform float veins; uniform float redness;
-uniform float lid_shade; uniform float lid_shade_mm; uniform float meniscus_mm;
+uniform float lid_shade; uniform float lid_shade_mm; uniform vec4 lid_shade_shares; uniform float lash_veil; uniform float meniscus_mm;
+uniform vec2 tears_rad;                // over which a lamp's edge is blurred in the tears: over the cornea, and over the uneven sclera and the corner's tissue
 uniform vec3 noise_origin;
 const float SPREAD_MM = 0.9;           // of light in the sclera
 const float F0 = 0.0207;               // Fresnel at the tears' index of 1.336
-// Radians over which a lamp's edge is blurred in the tears: over the cornea, and over the uneven sclera and the corner's tissue.
-const vec2 SMOOTH = vec2(0.012, 0.09);
 const float MENISCUS = 0.16;           // and in the meniscus, whose bend is narrower than a pixel
 
 // Colour of the iris at q, mm of the gaze's frame; detail finer than a pixel fades.
@@ -68,10 +67,10 @@ void main() {
 
     // how far the lids' edges are, and their shade
     vec2 edge = has_edges == 1 ? to_edges(edges, edges_mm, front.xy) : vec2(20.0);
-    float over = 0.5 * lid_shade * exp(-max(edge.y, 0.0) / (0.4 * lid_shade_mm));
-    float corner = 0.62 * lid_shade * (1.0 - 0.6 * sheet) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 3.4);
+    float over = lid_shade_shares.x * lid_shade * exp(-max(edge.y, 0.0) / (0.4 * lid_shade_mm));
+    float corner = lid_shade_shares.y * lid_shade * (1.0 - 0.6 * sheet) * exp(-max(edge.x + edge.y - 1.0, 0.0) / 3.4);
     // where a lid's rim touches the ball hardly any light comes in
-    float touch = 0.65 * lid_shade * (1.0 - sheet) * max(exp(-max(edge.x, 0.0) / 0.35), 0.55 * exp(-max(edge.y, 0.0) / 0.22));
+    float touch = lid_shade_shares.z * lid_shade * (1.0 - sheet) * max(exp(-max(edge.x, 0.0) / 0.35), 0.55 * exp(-max(edge.y, 0.0) / 0.22));
 
     // iris, seen through the cornea
     vec3 q = to_iris(p, n * frame, -v * frame);
@@ -105,7 +104,7 @@ void main() {
     // light that ends on the iris came in higher on the cornea, nearer to the lid and its lashes; the ball's sides turn away from it
     float behind = 1.0 - max(white, sheet);
     float under = min(lid_shade * (1.0 + 0.30 * behind), 1.0) * exp(-max(edge.x - 0.9 * behind, 0.0) / lid_shade_mm);
-    float sides = 0.42 * lid_shade * (1.0 - 0.6 * sheet) * smoothstep(0.55, 1.25, angle);
+    float sides = lid_shade_shares.w * lid_shade * (1.0 - 0.6 * sheet) * smoothstep(0.55, 1.25, angle);
     vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner) * (1.0 - sides) * (1.0 - touch)), vec3(0.90, 1.06, 1.12));  // lids send back red light
     // the corner: the fold is pink, the caruncle redder and dull
     // no brighter than the sclera that it stands beside
@@ -128,7 +127,7 @@ void main() {
     wet_n = normalize(wet_n + lumps * vec3(noise(solid / 0.7), noise(solid / 0.7 + 7.0), noise(solid / 0.7 + 13.0)));
 
     vec3 baked = max(vec3(dot(light[0], n), dot(light[1], n), dot(light[2], n)), 0.0);
-    vec3 irradiance = baked;
+    vec3 irradiance = baked * (1.0 - lash_veil * (1.0 - sheet));  // no strand was there when that was baked
     vec3 specular = vec3(0.0), r = reflect(-v, wet_n), qn = vec3(q.xy, iris_z(length(q.xy)));
     if (dot(r, n) < 0.0) r = normalize(r - n * (dot(r, n) - 0.02));
     float nv = max(dot(wet_n, v), 0.02), mirror = schlick(F0, nv);
@@ -143,9 +142,9 @@ void main() {
             seen += 0.25 * visibility(k, world + across * o.x + along * o.y, n, phase + 1.3 * float(j));
         }
         float on_iris = through_cornea(qn, l * frame);
-        float on_white = smoothstep(-0.25, 1.0, dot(n, l));  // light wraps: the sclera scatters
+        float on_white = 0.8 * smoothstep(-0.25, 1.0, dot(n, l));  // light wraps: the sclera scatters, and adds none to what falls on the ball
         irradiance += light_here * seen * mix(on_iris, on_white, max(white, tissue));
-        specular += seen * mirror * lamp_mirrored(k, world, r, max(mix(SMOOTH.x, SMOOTH.y, max(white, tissue)), MENISCUS * smoothstep(0.0, 0.4, wet)));
+        specular += seen * mirror * lamp_mirrored(k, world, r, max(mix(tears_rad.x, tears_rad.y, max(white, tissue)), MENISCUS * smoothstep(0.0, 0.4, wet)));
     }
     irradiance *= shade * (1.0 + 0.25 * sheet);  // light comes to the corner through the lids about it too
     // what is around, mirrored; the upper lid and its lashes stand before it

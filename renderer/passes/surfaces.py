@@ -397,6 +397,7 @@ class Surfaces:
             "wrinkles_behind": skin.wrinkles_behind_mm,
             "lip_folds": skin.lip_folds,
             "lid_margin": skin.lid_margin,
+            "lid_margin_shares": skin.lid_margin_shares,
             "lash_line": skin.lash_line,
             **self.flesh(drawn),
             **(_local(material) if isinstance(material, Shading) else {}),

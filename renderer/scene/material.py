@@ -194,6 +194,12 @@ class Skin(Material):
     lid_margin: tuple[float, float, float] = parameter(
         (0.49, 0.27, 0.24), source="albedo of the wet rim of lids, by eye", **_SHARE
     )
+    lid_margin_shares: tuple[float, float, float] = parameter(
+        (0.22, 0.45, 0.45),
+        unit="of lid_margin over the skin's own; of light lost at the ball, below the upper lid",
+        source="by eye",
+        **_SHARE,
+    )
     tarsus: float = parameter(
         0.8, source="of what comes through a lid, that its plate stops, by eye", **_SHARE
     )

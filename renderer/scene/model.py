@@ -76,7 +76,10 @@ EYE_VALUES = (
     "redness",
     "lid_shade",
     "lid_shade_mm",
+    "lid_shade_shares",
+    "lash_veil",
     "meniscus_mm",
+    "tears_rad",
 )
 
 

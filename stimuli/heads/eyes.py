@@ -27,9 +27,9 @@ BESIDE_MM = 0.6  # of the opening: there a lining begins, below the lids' rims
 COLOURS = ("iris", "fibres", "collarette", "sclera")
 
 
-def values_of(own: Eyes) -> dict[str, float]:
+def values_of(own: Eyes) -> dict[str, float | tuple[float, ...]]:
     """What the eye's shader takes of a person's fields."""
-    return {name: float(getattr(own, name)) for name in EYE_VALUES}
+    return {name: getattr(own, name) for name in EYE_VALUES}
 
 
 def eyeball(

@@ -257,7 +257,7 @@ def _eyes(rng: np.random.Generator, light: float, tone: float, age: float) -> di
     iris, fibres, collarette, *_ = _IRISES[_choice(rng, names, odds)]
     scale = rng.uniform(0.85, 1.15)
     yellow = 0.35 * tone + 0.25 * np.clip((age - 40) / 40, 0, 1)
-    sclera = np.array([0.47, 0.405, 0.385]) * (1 - yellow * np.array([0.38, 0.46, 0.55]))
+    sclera = np.array([0.54, 0.466, 0.443]) * (1 - yellow * np.array([0.38, 0.46, 0.55]))
     colours = {"iris": iris, "fibres": fibres, "collarette": collarette}
     table: dict[str, Any] = {
         name: [_rounded(scale * v, 4) for v in value] for name, value in colours.items()

@@ -54,7 +54,7 @@ class Eyes(Parameters):
     limbus: float = parameter(
         0.5, unit="share of light that the ring takes", low=0.0, high=1.0, source="by eye"
     )
-    sclera: tuple[float, float, float] = parameter((0.41, 0.355, 0.320), source="by eye", **_COLOUR)
+    sclera: tuple[float, float, float] = parameter((0.47, 0.407, 0.367), source="by eye", **_COLOUR)
     veins: float = parameter(1.0, unit="of their strength", low=0.0, high=4.0, source="by eye")
     redness: float = parameter(
         1.0, unit="of the corners' redness", low=0.0, high=4.0, source="by eye"
@@ -123,8 +123,29 @@ class Eyes(Parameters):
     lid_shade_mm: float = parameter(
         2.4, unit="mm, over which it falls by e", low=0.2, high=10.0, source="by eye"
     )
+    lid_shade_shares: tuple[float, float, float, float] = parameter(
+        (0.5, 0.62, 0.65, 0.42),
+        unit="of lid_shade: at the lower lid, the corners, where a lid touches, the ball's sides",
+        low=0.0,
+        high=1.0,
+        source="by eye",
+    )
+    lash_veil: float = parameter(
+        0.2,
+        unit="share of light from everywhere that lashes keep off the ball",
+        low=0.0,
+        high=1.0,
+        source="by eye; more where they are dense, or the skin about them sends less back",
+    )
     meniscus_mm: float = parameter(
         0.35, unit="mm, height", low=0.0, high=1.5, source="Mainstone et al. 1996: 0.2 to 0.5 mm"
+    )
+    tears_rad: tuple[float, float] = parameter(
+        (0.03, 0.09),
+        unit="radians, over which a lamp's edge is blurred: on the cornea, on the white",
+        low=0.002,
+        high=0.5,
+        source="by eye; a film of tears is uneven by some hundredths",
     )
     caruncle: float = parameter(
         1.0, unit="of 4 mm, 0: none", low=0.0, high=1.6, source="Duke-Elder 1961: 5 by 3 mm"

@@ -154,6 +154,31 @@ def test_the_upper_lid_shades_the_ball_less_and_less_away_from_it():
     assert (np.diff(share) > 0).all() and share[0] < 0.75 and 0.8 < share[-1] < 1
 
 
+def test_lashes_keep_light_from_everywhere_off_the_ball_and_a_lamps_not():
+    own = replace(PLAIN, meniscus_mm=0.0, lid_shade=0.0, lash_veil=0.3)
+    lamp = DistantLight(WHITE, shadow=False, direction=(0.0, 0.0, 1.0), radius_deg=1.0)
+    for light, left in (({}, 0.7), ({"lights": [lamp], "environment": Environment()}, 1.0)):
+        veiled, bare = (
+            seen(eyeball(Eyeball(np.zeros(3), 12.0), o), **light)[0][SIZE // 2, SIZE // 2, 1]
+            for o in (own, replace(own, lash_veil=0.0))
+        )
+        assert bare > 0 and veiled / bare == pytest.approx(left, rel=0.01)
+
+
+def test_each_share_of_the_lids_shade_darkens_the_ball_by_itself():
+    none = replace(PLAIN, meniscus_mm=0.0, lid_shade=0.6, lid_shade_shares=(0.0,) * 4)
+    shares = 0.9 * np.eye(4)
+    light = [
+        seen(eyeball(Eyeball(np.zeros(3), 12.0), o, almond()))[0][..., 1]
+        for o in (none, *(replace(none, lid_shade_shares=tuple(row)) for row in shares))
+    ]
+    seen_ball = light[0] > 0
+    lost = [np.where(seen_ball, 1 - own / np.maximum(light[0], 1e-9), 0) for own in light[1:]]
+    assert all(each.max() > 0.2 and each.min() > -1e-3 for each in lost)
+    middle = slice(SIZE // 2 - 4, SIZE // 2 + 4)
+    assert all(each[middle, middle].max() < 0.2 for each in lost)
+
+
 def test_the_catchlight_moves_with_the_lamp():
     eye = eyeball(Eyeball(np.zeros(3), 12.0), PLAIN)
     places = []
