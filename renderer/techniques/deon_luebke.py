@@ -25,6 +25,7 @@ from renderer.scene.lights import PointLight
 from renderer.techniques.atlas import Atlas
 from renderer.techniques.atlas_gaussians import AtlasGaussians
 from renderer.techniques.cascade import ADD, START
+from renderer.techniques.drawing import draw_kept
 
 #: Taken for the thickness where a lamp shines on the surface itself (the chapter's listing).
 LIT_MM = 50.0
@@ -120,6 +121,9 @@ class DeonLuebke(AtlasGaussians):
             yield atlas.light, None
             return
         programs = atlas.inputs.programs
+        kept = atlas.target(GL.GL_R32F)
+        draw_kept(atlas.inputs, atlas.room, (atlas.drawn,), kept, "ATLAS")
+        atlas.given["kept"] = kept.textures[0]
         with ExitStack() as held:
             formats = [GL.GL_RGBA16F, GL.GL_RGBA32F]
             ways = held.enter_context(gl.Target(atlas.size, atlas.size, formats, True, True))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, Self
 
 from renderer import gl
 from renderer.gl import GL
-from renderer.techniques.base import Inputs
+from renderer.passes.surfaces import Drawn
+from renderer.techniques.base import Inputs, Room
 
 #: Of every technique's result: scattered irradiance, then samples and contrast.
 RESULT_FORMATS = (GL.GL_RGBA32F, GL.GL_RG16F)
@@ -23,6 +24,24 @@ def result(inputs: Inputs, depth: gl.Target | None = None) -> Iterator[gl.Target
     except BaseException:
         made.delete()
         raise
+
+
+def draw_kept(
+    inputs: Inputs, room: Room, surfaces: Iterable[Drawn], into: gl.Target, domain: str = "SCREEN"
+) -> None:
+    """Draw the share that lids, lips and ears leave of what comes through to places on surfaces.
+
+    domain: where they are seen, of a target that shares the depth of what is seen; "ATLAS": their
+    atlas.
+    """
+    into.bind(clear=(1.0, 1.0, 1.0, 1.0))
+    into.bind(depth_test=domain == "SCREEN")
+    GL.glDepthMask(False)
+    program = inputs.programs("passes/kept.frag", {"DOMAIN": domain}, vertex="passes/surface.vert")
+    for drawn in surfaces:
+        own = {**room.camera, "model": drawn.item.pose, **room.flesh(drawn)}
+        program.use(**program.accepts(own))
+        drawn.mesh.draw()
 
 
 class Drawing:

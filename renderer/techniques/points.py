@@ -25,7 +25,7 @@ from renderer.passes.surfaces import Drawn
 from renderer.scene.harmonics import COSINE, project
 from renderer.scene.maps import directions
 from renderer.techniques.base import Inputs, Room, Scattered, Technique
-from renderer.techniques.drawing import result
+from renderer.techniques.drawing import draw_kept, result
 from renderer.techniques.samples import Body, Samples
 
 TABLE = 512  # texels of a profile along the distance, 256 to 512 in Rohat 2012, sec. 5.1
@@ -187,7 +187,7 @@ class PointsTechnique(Technique):
                 gl.Target(*size, [GL.GL_R32F], depth=room.depth()) as kept,
                 gl.Target(*size, list(SUMS)) as sums,
             ):
-                self._keep(inputs, room, kept)
+                draw_kept(inputs, room, room.surfaces, kept)
                 sums.bind(clear=(0.0, 0.0, 0.0, 0.0))
                 for parts in self._bodies(room):
                     self._one(inputs, room, parts, sums)
@@ -202,19 +202,6 @@ class PointsTechnique(Technique):
                 )
                 gl.draw_fullscreen(inputs.context)
         return Scattered(target)
-
-    def _keep(self, inputs: Inputs, room: Room, kept: gl.Target) -> None:
-        """Draw what the surfaces that are seen keep of the light that comes through to them."""
-        kept.bind(clear=(1.0, 1.0, 1.0, 1.0))
-        kept.bind(depth_test=True)
-        GL.glDepthMask(False)
-        program = inputs.programs(
-            "techniques/splat_kept.frag", {"DOMAIN": "SCREEN"}, vertex="passes/surface.vert"
-        )
-        for drawn in room.surfaces:
-            own = {**room.camera, "model": drawn.item.pose, **room.flesh(drawn)}
-            program.use(**program.accepts(own))
-            drawn.mesh.draw()
 
     def _bodies(self, room: Room) -> list[tuple[Drawn, ...]]:
         """The surfaces between which light travels, group by group."""

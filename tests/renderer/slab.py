@@ -138,6 +138,12 @@ def lit(frame, light, medium=1):
     return replace(inputs, room=replace(room, placed=placed))
 
 
+def behind_cartilage(inputs, share):
+    """Inputs of surfaces about the origin that are an ear, whose cartilage stops a share."""
+    flesh, stops = inputs.room.flesh, {"ear_l": np.zeros(3), "cartilage": share}
+    return replace(inputs, room=replace(inputs.room, flesh=lambda drawn: flesh(drawn) | stops))
+
+
 def places(frame):
     """Where the pixels' surfaces lie: (H, W, 3) mm in the world, and which scatter (H, W)."""
     height, width = frame.height, frame.width

@@ -10,6 +10,7 @@ from stimuli import scenes
 from stimuli.scenes import staging
 from tests.renderer.slab import (
     BALL,
+    behind_cartilage,
     frame_of_ball,
     lit,
     places,
@@ -101,7 +102,8 @@ def test_overlapping_texture_coordinates_are_refused(monkeypatch):
 @pytest.mark.parametrize("thickness_mm", [1.0, 3.0])
 def test_a_sheet_lit_from_behind_lets_the_widest_gaussians_through(thickness_mm):
     """Sum of w exp(-t^2 / 2v) of the last three, as in the chapter's listing; in front, where the
-    lamp shines on the face itself, nothing is added."""
+    lamp shines on the face itself, nothing is added. Of what comes through, cartilage of an ear
+    about the sheet's middle stops its share."""
     technique = renderer.make("deon_luebke", {"size": 256, "texturing": 0.0})
     for towards, through in (-1.0, 1.0), (1.0, 0.0):
         table = {
@@ -113,12 +115,17 @@ def test_a_sheet_lit_from_behind_lets_the_widest_gaussians_through(thickness_mm)
         }
         graph = scenes.stage(scenes.read_scene(table)).graph
         with renderer.Renderer(graph, (48, 48), 1, rays=8, shadow_map=256) as drawing:
-            with drawing.frame() as frame, technique.scatter(frame.inputs(False)).target as target:
-                got = target.textures[0].read()[24, 24, :3]
+            with drawing.frame() as frame:
+                whole, got = frame.inputs(False), []
+                for given in (whole, behind_cartilage(whole, 0.25)):
+                    with technique.scatter(given).target as target:
+                        got.append(target.textures[0].read()[24, 24, :3].copy())
                 lit_face = frame.surface.textures[0].read()[24, 24, :3]
         fit = technique.fit(SKIN)
         falling = fit.weights * np.exp(-(thickness_mm**2) / (2 * fit.variance_mm2[:, None]))
-        np.testing.assert_allclose(got, lit_face + through * falling[-3:].sum(0), atol=3e-3)
+        wanted = through * falling[-3:].sum(0)
+        np.testing.assert_allclose(got[0], lit_face + wanted, atol=3e-3)
+        np.testing.assert_allclose(got[1], got[0] - 0.25 * wanted, atol=1e-3)
 
 
 def test_a_blurred_stretch_map_is_the_map_itself_where_the_texture_is_even():

@@ -1,4 +1,4 @@
-// The share of what comes through to the surface seen here that is left: lids, lips and ears stop some of it, for every technique.
+// The share that lids, lips and ears leave of what comes through to a place, for techniques that reckon it themselves.
 #include "passes/lids.glsl"
 in vec3 local; in vec4 a; in vec4 b;
 layout(location = 0) out vec4 kept;
