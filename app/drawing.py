@@ -95,6 +95,7 @@ _SAID = {
     "albedo": ("--albedo", None, "Image of its skin's albedo (sRGB), over its own."),
     "normal": ("--normal", None, "Normal map, tangent space, green up, over its own."),
     "skin": ("--skin", None, "Person whose skin it gets: pores, oil, redness, melanin."),
+    "hair": ("--hair", None, "Person whose hair, brows, lashes and beard it gets."),
     "licence": ("--licence", None, "Its licence, for manifest and study."),
     "credit": ("--credit", None, "Who made it, for manifest and study."),
 }

@@ -122,6 +122,7 @@ SAID_OF_HEAD = (
     "albedo",
     "normal",
     "skin",
+    "hair",
 )
 _WORDING = ("question", "scale", "familiarity", "consent")
 

@@ -76,7 +76,8 @@ class Scan(Object):
     `up` and `forward` are axes of the file; `yaw_deg` turns the head to its left after that.
     `head_mm` is its height from crown to chin, `mm_per_unit` scales the file's coordinates;
     `landmarks` names a TOML file of points in them. Coarse scans are subdivided smoothly until
-    their edges are `edge_mm` long at most half of them.
+    their edges are `edge_mm` long at most half of them. `hair` names the person whose generated
+    hair, brows, lashes and beard it gets.
     """
 
     shape: ClassVar[str] = "scan"
@@ -96,6 +97,7 @@ class Scan(Object):
     edge_mm: float = parameter(
         2.5, unit="mm", low=0.2, high=1000.0, source="a pixel of a 1080p close-up is .13 mm"
     )
+    hair: str | None = parameter((None, "woman"), optional=True)
     licence: str | None = parameter((None, "CC-BY-4.0"), optional=True)
     credit: str | None = parameter((None, "who made it"), optional=True)
 

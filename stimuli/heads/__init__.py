@@ -57,13 +57,15 @@ def load_person(
     return Head(name, person_model(person, seed), origin, [fetch.LICENCE])
 
 
-def load_scan(scan: Scan) -> Head:
+def load_scan(scan: Scan, seed: int = 0) -> Head:
     """A user's scan: a .glb, .gltf, .obj, .ply or .stl file and what the scene says of it.
 
     How it stands is found out where the scene does not say (stimuli.heads.placing); the eyes are
-    taken from parts named so, else from the face. Raises stimuli.errors.InputError for a file that
+    taken from parts named so, else from the face. seed: of the hair, where the scene asks for a
+    person's. Raises stimuli.errors.InputError for a file that
     cannot be used.
     """
+    from stimuli.heads.person import Person
     from stimuli.heads.placing import Asked, by_face
     from stimuli.heads.scan import read_scan
     from stimuli.heads.scan_model import scan_model
@@ -87,10 +89,14 @@ def load_scan(scan: Scan) -> Head:
         )
     terms |= {"licence": scan.licence or "not said"}
     terms |= {"credit": credit} if credit else {}
-    model = scan_model(read, scan.edge_mm)
+    person = None
+    if scan.hair is not None:
+        person = Person.read(person_table(scan.hair), scan.hair)
+    model = scan_model(read, scan.edge_mm, person, seed)
     if model.eyes and "eye" not in read.part_kinds:
         notes.append(f"{read.name}: its sockets are open and got eyes")
     before, after = len(read.positions_mm), len(model.surface.positions)
     if after > before:
         notes.append(f"{read.name}: it was subdivided smoothly, {before} points to {after}")
-    return Head(read.name, model, read.provenance(), [terms], tuple(notes))
+    origin = read.provenance() | ({"hair": scan.hair} if scan.hair is not None else {})
+    return Head(read.name, model, origin, [terms], tuple(notes))

@@ -63,7 +63,7 @@ def eyeball(
     if opening is not None and own.caruncle:
         more, own_tissue = corner(ball, opening, own)
         sheet = _grid(ACROSS, UP, False)
-        if ball.centre[0] < 0:
+        if ball.side < 0:
             sheet = sheet[:, ::-1]
         faces = np.vstack([faces, sheet + len(positions)])
         positions = np.vstack([positions, more])
@@ -88,7 +88,7 @@ def eyeball(
         tissue.astype(np.float32),
         np.zeros((1, 1, 2), np.float32) if opening is None else opening.edge_map(),
         MAP_MM,
-        vessel_map(seed, own.iris_mm / ball.radius, ball.centre[0] > 0),
+        vessel_map(seed, own.iris_mm / ball.radius, ball.side > 0),
         own.gaze == "lens",
     )
 
@@ -109,7 +109,7 @@ def corner(ball: Eyeball, opening: Opening, own: Eyes) -> tuple[np.ndarray, np.n
     """The sheet in the inner corner: points (ACROSS UP, 3) mm, and of each (ACROSS UP, 2) how much
     is flesh, above 0, and how much caruncle. It goes over into the sclera where it meets the ball.
     """
-    side = 1.0 if ball.centre[0] > 0 else -1.0
+    side = ball.side
     x_in = side * (opening.x[0] if side > 0 else opening.x[-1])  # the inner corner, below 0
     deep = opening.corners[0 if side > 0 else 1]
     # from behind the corner to where it is well inside the ball
@@ -150,7 +150,7 @@ def rims(
     """Below the rims of a mesh's (N, 3), (M, 3) lids, from the upper one's middle round the outer
     corner to the lower one's: (LINING, 3) mm; None where its skin is not all there.
     """
-    side = 1.0 if ball.centre[0] > 0 else -1.0
+    side = ball.side
     inner, outer = opening.x[:: int(side)][[0, -1]]
     t = np.abs(np.linspace(-1, 1, LINING))  # 0 at the corner
     x = outer + (1 - LINED) * (inner - outer) * t**2
@@ -177,6 +177,6 @@ def lining(ball: Eyeball, rims: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
     faces = _grid(LINING, ROWS, False)
     flesh = np.repeat(PALE + (1 - PALE) * (1 - share[..., 0]), LINING, axis=0)
     tissue = np.stack([flesh, np.zeros_like(flesh)], axis=2).reshape(-1, 2)
-    if ball.centre[0] > 0:
+    if ball.side > 0:
         faces = faces[:, ::-1]
     return ball.centre + points.reshape(-1, 3), tissue, faces

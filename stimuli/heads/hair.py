@@ -14,7 +14,6 @@ from scipy.special import betaincinv
 from renderer.scene import MASKS, Strands
 from renderer.scene.shapes import points_on, triangle_areas
 from stimuli.heads import growth, lashes
-from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.person import Hair, Lashes
 from stimuli.heads.skin import azimuth
 from stimuli.heads.smooth import smoothstep
@@ -488,7 +487,7 @@ def vellus(scalp: Scalp, eyes: np.ndarray, rng: np.random.Generator, count: int,
 
 
 def all_strands(
-    anatomy: Anatomy,
+    head: lashes.Lidded,
     scalp: Scalp,
     seed: int,
     share: float = 1.0,
@@ -498,12 +497,12 @@ def all_strands(
     """Every strand of the head; share scales the numbers (tests use few)."""
     own, lash = own or Hair(), lash or Lashes()
     rng = np.random.default_rng([seed, 11])
-    eyes = anatomy.landmarks["eyes"]
-    balls = [ball.centre for ball in anatomy.eyes]
+    eyes = head.landmarks["eyes"]
+    balls = [ball.centre for ball in head.eyes]
     parts = [
         *scalp_hair(scalp, eyes, rng, share, own),
         *brows(scalp, balls, rng, int(own.brows * share), own),
-        *lashes.grown(anatomy, scalp.positions, scalp.faces, rng, lash, own, POINTS),
+        *lashes.grown(head, scalp.positions, scalp.faces, rng, lash, own, POINTS),
         stubble(scalp, rng, int(own.stubble * share), own),
         vellus(scalp, eyes, rng, int(own.vellus * share), own),
     ]

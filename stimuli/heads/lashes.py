@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
 import numpy as np
 import trimesh
 
-from stimuli.heads.anatomy import Anatomy
 from stimuli.heads.lids import Eyeball, Opening
 from stimuli.heads.person import Hair, Lashes
 
@@ -19,8 +21,19 @@ BARE_MM = 5.2  # from the inner corner: over the lake of tears no lash grows
 DARKER = 0.6  # of the hair's colour
 
 
+class Lidded(Protocol):
+    """A head that hair can be grown on: named points (3,), balls, the openings before them."""
+
+    @property
+    def landmarks(self) -> Mapping[str, np.ndarray]: ...
+    @property
+    def eyes(self) -> Sequence[Eyeball]: ...
+    @property
+    def openings(self) -> Sequence[Opening | None]: ...
+
+
 def grown(
-    anatomy: Anatomy,
+    head: Lidded,
     skin: np.ndarray,
     faces: np.ndarray,
     rng: np.random.Generator,
@@ -34,7 +47,7 @@ def grown(
     """
     colour = np.array(hair.colour) * DARKER if own.colour is None else np.array(own.colour)
     out = []
-    for ball, opening in zip(anatomy.eyes, anatomy.openings, strict=True):
+    for ball, opening in zip(head.eyes, head.openings, strict=True):
         if opening is None:
             continue
         near = np.linalg.norm(skin - ball.centre, axis=1) < 2.0 * ball.radius
@@ -74,7 +87,7 @@ def _lid(
     colour: np.ndarray,
     points: int,
 ) -> dict:
-    side = 1.0 if ball.centre[0] > 0 else -1.0
+    side = ball.side
     first = side * (opening.x[0] if side > 0 else opening.x[-1]) + BARE_MM
     # towards the outer corner they would cross those of the other lid
     last = side * (opening.x[-1] if side > 0 else opening.x[0]) - (1.0 if upper else 2.5)

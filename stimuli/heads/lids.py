@@ -14,7 +14,7 @@ the margin 2 mm, Duke-Elder 1961.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,10 +50,19 @@ MAP_SIZE = (200, 120)  # its texels
 
 @dataclass(frozen=True)
 class Eyeball:
-    """Centre (3,) and radius, mm."""
+    """Centre (3,) and radius, mm; left: the person's left eye, by x > 0 where it is not said, as of
+    heads that stand in the middle.
+    """
 
     centre: np.ndarray
     radius: float
+    left: bool | None = None
+
+    @property
+    def side(self) -> float:
+        """1 for the left eye, -1 for the right one: where its temple is along x."""
+        left = self.centre[0] > 0 if self.left is None else self.left
+        return 1.0 if left else -1.0
 
 
 @dataclass(frozen=True)
@@ -178,7 +187,7 @@ def seated(positions: np.ndarray, faces: np.ndarray, ball: Eyeball) -> Eyeball:
         found = opening(positions, faces, ball)
         if found is None:
             return ball
-        side = 1.0 if ball.centre[0] > 0 else -1.0
+        side = ball.side
         outer, middle = found.x[-1 if side > 0 else 0], 0.5 * (found.x[0] + found.x[-1])
         x = side * outer - (radius - LATERAL_MM * size)
         x = side * np.clip(x - side * middle, *(size * mm for mm in OUTWARD_MM)) + middle
@@ -198,7 +207,7 @@ def seated(positions: np.ndarray, faces: np.ndarray, ball: Eyeball) -> Eyeball:
         if not len(lids):
             return ball
         z = np.quantile(lids, SEATED) - RIM_MM * size
-        ball = Eyeball(ball.centre + [x, y, z], radius)
+        ball = replace(ball, centre=ball.centre + [x, y, z])
     return ball
 
 
@@ -224,7 +233,7 @@ class _Shape:
 
     def __init__(self, ball: Eyeball, measured: Opening, own: Eyes):
         self.old, self.own = ball, own
-        side = 1.0 if ball.centre[0] > 0 else -1.0
+        side = ball.side
         self.side = side
         x, lower, upper = measured.x, measured.lower, measured.upper
         if side < 0:
@@ -286,7 +295,7 @@ class _Shape:
     @property
     def ball(self) -> Eyeball:
         turned = self.centre * [self.side, 1, 1]
-        return Eyeball(self.old.centre + turned, self.own.radius_mm)
+        return Eyeball(self.old.centre + turned, self.own.radius_mm, self.old.left)
 
     def goal(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper edge that are wanted at new x (N,): an almond, the upper one highest

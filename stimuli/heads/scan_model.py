@@ -8,10 +8,12 @@ import numpy as np
 from scipy import sparse
 
 from renderer.scene import MASKS, Eye, Material, Model, Proxy, Surface
+from stimuli.errors import InputError
 from stimuli.heads import eyes, template
 from stimuli.heads.formats import decode_srgb
 from stimuli.heads.lids import Eyeball, clear, opening, seated
-from stimuli.heads.person import Eyes
+from stimuli.heads.person import Eyes, Person
+from stimuli.heads.scan_hair import grown
 from stimuli.heads.subdivide import vertex_normals
 
 PROXY_LIMIT = 60_000  # vertices: above it light is baked on a clustered mesh
@@ -124,10 +126,15 @@ def _masks(scan, p: np.ndarray, normals: np.ndarray) -> np.ndarray:
     distance, index = tree.query(np.hstack([own, MATCH_MM * facing]), k=4)
     weight = 1 / (distance + 1.0) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
-    masks = (shape.masks[index] * weight[..., None]).sum(axis=1)
-    for name in ("hair", "beard", "inside"):  # a scan brings its own, or none
+    return (shape.masks[index] * weight[..., None]).sum(axis=1).astype(np.float32)
+
+
+def _bare(masks: np.ndarray, *grown: str) -> np.ndarray:
+    """Masks (N, len(MASKS)) without what a scan brings itself or lacks, but for what was grown."""
+    masks = masks.copy()
+    for name in {"hair", "beard", "inside"} - set(grown):
         masks[:, MASKS.index(name)] = 0
-    return masks.astype(np.float32)
+    return masks
 
 
 def _sockets(p, faces, marks, scale: float) -> tuple[Eyeball, ...]:
@@ -170,7 +177,7 @@ def _sockets(p, faces, marks, scale: float) -> tuple[Eyeball, ...]:
             return ()
         z = np.quantile(depth[rim][near] - np.sqrt(radius**2 - beside[near]), 0.25)
         place = np.array([marks[name][0] + x, marks[name][1] + y, z])
-        balls.append(Eyeball(place, float(radius)))
+        balls.append(Eyeball(place, float(radius), name == "eye_l"))
     return tuple(balls)
 
 
@@ -259,16 +266,18 @@ def _own_eyes(points: np.ndarray) -> tuple[Eyeball, ...]:
     if min(map(len, sides)) < 8:
         return ()
     balls = []
-    for side in sides:
+    for left, side in zip((True, False), sides, strict=True):
         low, high = side.min(axis=0), side.max(axis=0)
         radius = 0.25 * ((high - low)[0] + (high - low)[1])
-        balls.append(Eyeball(np.array([*(0.5 * (low + high))[:2], low[2] + radius]), float(radius)))
+        centre = np.array([*(0.5 * (low + high))[:2], low[2] + radius])
+        balls.append(Eyeball(centre, float(radius), left))
     return tuple(balls) if all(8 < ball.radius < 18 for ball in balls) else ()
 
 
-def scan_model(scan, edge_mm: float = 2.5) -> Model:
+def scan_model(scan, edge_mm: float = 2.5, person: Person | None = None, seed: int = 0) -> Model:
     """A user's scan, subdivided to edges of `edge_mm`: its own maps on its skin; eyes and teeth
-    drawn without scattering; hair as surface.
+    drawn without scattering; hair as surface. person: whose generated hair it gets, drawn from
+    `seed`.
 
     Left out: clear shells over the eyes, and cards of lashes and brows, which are nothing without
     their alpha. Eyes without a texture are replaced by the default head's, which open sockets get.
@@ -311,6 +320,16 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     positions, normals = _over_the_balls(positions, normals, faces, balls)
     masks = _masks(scan, positions, normals)
     near = _masks(scan, proxy.positions, proxy.normals)
+    strands = None
+    if person is not None:
+        if "hair" in kinds:
+            named = scan.part_names[kinds.index("hair")]
+            raise InputError(
+                f"{scan.name}: its part {named!r} is hair, and more was asked for; expected no hair"
+            )
+        strands = grown(scan.name, placing, positions, normals, faces, masks, balls, person, seed)
+    own_hair = () if person is None else ("hair", "beard")
+    masks, near = _bare(masks, *own_hair), _bare(near, *own_hair)
     own = {
         "albedo_map": scan.albedo,
         "normal_map": scan.normal_map,
@@ -330,7 +349,7 @@ def scan_model(scan, edge_mm: float = 2.5) -> Model:
     return Model(
         surface,
         tuple(_eye(positions, faces, ball) for ball in balls),
-        None,
+        strands,
         _landmarks(scan, positions, eye_points, balls),
         material=Material(albedo=tuple(float(v) for v in colour)),
     )

@@ -56,7 +56,7 @@ def _model(thing: objects.Object, scene: Scene, seed: int):
         if isinstance(thing, objects.Person):
             head = load_person(thing.person, seed, thing.dressed, thing.expression)
         else:
-            head = load_scan(thing)
+            head = load_scan(thing, seed)
             own = head.model.surface.base_colour
             if own is not None and material.albedo == Material().albedo:
                 material = replace(material, albedo=tuple(float(v) for v in own))

@@ -324,6 +324,59 @@ def _socket_seen(positions, faces, eye):
     return int(((lid - seen[index])[:, 2] > 2.5).sum())
 
 
+def placed_scan(tmp_path, points, faces, marks):
+    """A scan that is placed by landmarks, its groups' names of the file."""
+    from stimuli.heads.placing import Asked, by_face
+    from stimuli.heads.scan import read_scan
+
+    write_parts(tmp_path / "head.obj", [("Face", trimesh.Trimesh(points, faces, process=False))])
+    names = ("eye_l", "eye_r", "nose", "mouth", "chin")
+    text = "".join(f"{name} = {marks[name].tolist()}\n" for name in names)
+    (tmp_path / "marks.toml").write_text(text, encoding="utf-8")
+    asked = Asked(unit="mm", landmarks=str(tmp_path / "marks.toml"))
+    return read_scan(tmp_path / "head.obj", asked, by_face)
+
+
+def test_a_scan_gets_a_persons_hair_and_its_roots_lie_on_it(tmp_path):
+    from stimuli.errors import InputError
+    from tests.heads import awkward
+
+    few = Hair(scalp=900, brows=40, stubble=60, vellus=60)
+    person = replace(MAN, hair=replace(few, style=MAN.hair.style), lashes=Lashes(40, 20))
+    moved = awkward.turn("y", 30)  # and away from where the average head stands
+    points, faces, marks = awkward.head("woman")
+    points = points @ moved.T + [40.0, 300.0, -70.0]
+    marks = {name: at @ moved.T + [40.0, 300.0, -70.0] for name, at in marks.items()}
+    scan = placed_scan(tmp_path, points, faces, marks)
+    assert scan_model(scan, edge_mm=1000).strands is None
+    model = scan_model(scan, 1000, person, seed=3)
+    strands, skin = model.strands, model.surface
+    again = scan_model(scan, 1000, person, seed=3).strands
+    np.testing.assert_array_equal(strands.points, again.points)
+    surface = trimesh.Trimesh(skin.positions, skin.faces, process=False)
+    roots = strands.points[strands.first[:-1]]
+    assert trimesh.proximity.closest_point(surface, roots[::3])[1].max() < 0.05
+    # scalp above the eyes or behind them, nothing far from the head
+    eyes = model.landmarks["eyes"]
+    away = trimesh.proximity.closest_point(surface, strands.points[::17])[1]
+    assert away.max() < 40 and (roots[:, 1] - eyes[1]).max() > 80
+    for ball in model.eyes:  # brows and lashes over each eye
+        local = roots - ball.centre
+        over = (np.abs(local[:, 0]) < 16) & (local[:, 2] > 0) & (local[:, 1] > 7)
+        lids = np.linalg.norm(local, axis=1) < ball.radius + 4
+        assert (over & (local[:, 1] < 24)).sum() > 20 and lids.sum() > 50
+    assert skin.masks[:, MASKS.index("hair")].max() > 0.5  # its scalp is a scalp
+    # hair of its own, as geometry, and no face
+    dome = awkward._under_hair(awkward.head("woman")[0]) @ moved.T + [40.0, 300.0, -70.0]
+    with pytest.raises(InputError, match="mm off a bare head, so it has hair of its own"):
+        scan_model(placed_scan(tmp_path, dome, faces, marks), 1000, person)
+    with pytest.raises(InputError, match="'Hair' is hair, and more was asked for"):
+        named = replace(scan, part_names=("Face", "Hair"), part_kinds=("skin", "hair"))
+        scan_model(named, 1000, person)
+    with pytest.raises(InputError, match="no face was found in it, so hair cannot be placed"):
+        scan_model(replace(scan, placing=replace(scan.placing, fit=None)), 1000, person)
+
+
 def write_parts(file, parts):
     """An OBJ of named groups (name, mesh)."""
     lines, start = [], 1
