@@ -43,6 +43,7 @@ def fit(
     texel: float,
     pixel_mm: float,
     noise: float,
+    factors: tuple[float, ...] = (1.0,),
 ) -> Rings:
     """The point and so many rings whose answer to an edge is nearest to a profile's.
 
@@ -50,6 +51,7 @@ def fit(
     (C,): Burley's distances, as the scale of the problem. texel: side of what a tap is a mean over,
     as a share of its radius, never less than pixel_mm. noise: how much the squared weight of a tap,
     over the texels it is a mean of, counts beside the squared miss, times the widest distance.
+    factors: a ring is the mean of rings of its radius times each.
     """
     from scipy.optimize import least_squares, nnls
 
@@ -65,7 +67,7 @@ def fit(
     goal = _over_pixel(edge, x, pixel_mm)
     channels = goal.shape[1]
     log_r = np.linspace(np.log(0.05 * narrow), np.log(FARTHEST * wide), COLUMNS)
-    table = _answers(x, np.exp(log_r), texel, pixel_mm)
+    table = sum(_answers(x, f * np.exp(log_r), texel, pixel_mm) for f in factors) / len(factors)
     point = ndtr(-x / (np.sqrt(PIXEL_VARIANCE) * pixel_mm))
 
     def answers(radii: np.ndarray) -> np.ndarray:

@@ -4,14 +4,14 @@
 uniform sampler2D irradiance; uniform sampler2D depths;
 uniform sampler2D guarded;     // with its levels of means
 uniform sampler2D chosen;      // a texel a tile
-uniform sampler2D taps;        // two rows a rung: radius, angle, side of the mean, least radius of depth, mm; weights over the profile
+uniform sampler2D taps;        // two rows a rung: radius in mm, cosine, sine, side of the mean in mm; weights over the profile, least radius of depth in mm
 uniform float firsts[SETS];    // where each set begins
 uniform float on_ring[SETS];   // taps on each ring of it
 uniform vec3 shape;            // 1 / d per channel, 1/mm
 uniform float pixels_per_mm;
 uniform float filter_radius_mm;
 uniform float levels;          // of the pyramid
-uniform int sizes;             // of means, each a SMALLER-th of the last, that are tried before one pixel
+uniform int sizes;             // of means, each SMALLER levels below the last, that are tried before one pixel
 uniform float whole;           // the least share of a mean that the guard has to let in
 uniform float jitter;          // 1: a rotation a block at random, 0: the same for all pixels
 uniform float turn;            // of this frame, in turns
@@ -21,15 +21,14 @@ layout(location = 1) out vec4 count;
 
 // A mean over a texel spreads what it stands for by half its squared side: box and tent, along both axes (renderer/optics/rings.py).
 const float TEXEL_VARIANCE = 0.5;
-const float SMALLER = 3.0;
+const float SMALLER = 2.0;     // levels
 const float LOST = 1.0;        // pixels of each row of a mean that may be missing; a step of depth takes two
 const float STEEPEST = 8.0;    // slope of depth; what is steeper is a silhouette
 
 vec3 profile(float r) { vec3 third = exp(-shape * r / 3.0); return shape * (third * third * third + third) / r; }
 
 // Which even part of the turn between two taps a pixel of a block takes.
-float part_of_block(ivec2 pixel) {
-    ivec2 within = pixel % block;
+float part_of_block(ivec2 within) {
     int all = block * block;
     return float(7 * (within.y * block + within.x) % all) / float(all);
 }
@@ -45,39 +44,42 @@ void main() {
     if (!skin || filter_radius_mm * scale < 1.0) return;
     float foreshortened = max(abs(slope.x), abs(slope.y)) < STEEPEST ? inversesqrt(1.0 + dot(slope, slope)) : 1.0;
     vec4 tile = texelFetch(chosen, at / TILE, 0);
-    int set = int(tile.x), first = int(firsts[set]), row = 2 * clamp(int(tile.z), 0, textureSize(taps, 0).y / 2 - 1);
-    ivec2 pixel = ivec2(image_pixel());
+    int set = int(tile.x), first = int(firsts[set]), parts = block * block;
+    ivec2 pixel = ivec2(image_pixel()), within = pixel % block;
+    int row = 2 * (parts * clamp(int(tile.z), 0, textureSize(taps, 0).y / (2 * parts) - 1) + within.y * block + within.x);
     float noise = interleaved_gradient_noise(vec2(pixel / block) + 0.5);
-    float start = 2.0 * PI * (jitter * (noise + part_of_block(pixel) / on_ring[set]) + turn);
-    vec2 size = vec2(textureSize(guarded, 0));
-    vec3 weight = texelFetch(taps, ivec2(first, row + 1), 0).rgb * profile(texelFetch(taps, ivec2(first, row), 0).w);
+    float start = 2.0 * PI * (jitter * (noise + part_of_block(within) / on_ring[set]) + turn);
+    mat2 rotation = scale * mat2(cos(start), sin(start), -sin(start), cos(start));
+    vec2 size = vec2(textureSize(irradiance, 0)), padded = vec2(textureSize(guarded, 0));
+    vec4 weights = texelFetch(taps, ivec2(first, row + 1), 0);
+    vec3 weight = weights.rgb * profile(weights.w);
     vec3 light = weight * own.rgb;  // the first tap is the pixel itself
     for (int k = first + 1; k < first + int(tile.y); ++k) {
         vec4 tap = texelFetch(taps, ivec2(k, row), 0);
-        float phi = tap.y + start, texel_mm = pixel_mm * clamp(tap.z * foreshortened * scale, 1.0, exp2(levels));
-        vec2 towards = scale * vec2(cos(phi), sin(phi)), there;
-        vec4 mean;
+        weights = texelFetch(taps, ivec2(k, row + 1), 0);
+        vec2 towards = rotation * tap.yz, there;
+        float squared = tap.x * tap.x, spread = TEXEL_VARIANCE * tap.w * tap.w;
+        float level = clamp(log2(tap.w * foreshortened * scale), 0.0, levels);
+        vec4 mean = vec4(0.0);
         bool averaged = false;
-        for (int j = 0; j < sizes; ++j) {
-            if (averaged) continue;
+        for (int j = 0; j < sizes && !averaged; ++j) {
             // what another side than the fitted one spreads more or less by comes off the radius or on it
-            float squared = tap.x * tap.x + TEXEL_VARIANCE * (tap.z * tap.z - texel_mm * texel_mm);
-            there = gl_FragCoord.xy + sqrt(max(squared, 0.04 * tap.x * tap.x)) * towards;
-            mean = textureLod(guarded, there / size, log2(texel_mm * scale));
-            averaged = mean.a >= max(whole, 1.0 - LOST / (texel_mm * scale));
-            texel_mm = max(texel_mm / SMALLER, pixel_mm);
+            float side = exp2(level), read = side * pixel_mm;
+            there = gl_FragCoord.xy + sqrt(max(squared + spread - TEXEL_VARIANCE * read * read, 0.04 * squared)) * towards;
+            mean = textureLod(guarded, there / padded, level);
+            averaged = mean.a >= max(whole, 1.0 - LOST / side);
+            level = max(level - SMALLER, 0.0);
         }
         if (!averaged) {
-            float single = tap.x * tap.x + TEXEL_VARIANCE * max(tap.z * tap.z - pixel_mm * pixel_mm, 0.0);
-            there = gl_FragCoord.xy + sqrt(single) * towards;
+            there = gl_FragCoord.xy + sqrt(squared + max(spread - TEXEL_VARIANCE * pixel_mm * pixel_mm, 0.0)) * towards;
+            mean = texture(irradiance, (clamp(floor(there), vec2(0.0), size - 1.0) + 0.5) / size);
+            if (mean.a < 0.5) continue;
+            mean.a = 1.0;
         }
-        ivec2 middle = clamp(ivec2(floor(there)), ivec2(0), last);
-        vec4 fine = texelFetch(irradiance, middle, 0);
-        if (fine.a < 0.5) continue;
-        float step = texelFetch(depths, middle, 0).x - depth;
-        vec3 w = texelFetch(taps, ivec2(k, row + 1), 0).rgb * profile(sqrt(tap.w * tap.w + step * step));
+        float step = texture(depths, (clamp(floor(there), vec2(0.0), size - 1.0) + 0.5) / size).x - depth;
+        vec3 w = weights.rgb * profile(sqrt(weights.w * weights.w + step * step));
         weight += w;
-        light += w * (averaged ? mean.rgb / mean.a : fine.rgb);
+        light += w * mean.rgb / mean.a;
     }
     count.x = tile.y;
     scattered.rgb = mix(own.rgb, light / max(weight, 1e-12), greaterThan(weight, vec3(1e-8)));

@@ -6,9 +6,10 @@ importance sampling", doi:10.1111/j.1467-8659.2008.01252.x), but only where a gu
 step of depth and nothing that is not skin is in them. Their radii and weights are fitted to the
 profile (renderer/optics/rings.py), a pixel's own light being the first. The pixels of a block share
 a rotation and turn by even parts of it, so that a ring is met at even angles and what is linear in
-its light cancels. How many taps a pixel takes is decided for tiles of 8 x 8 pixels, from their
-means, before any tap is taken: no tap both decides and estimates. docs/subdermal.md has what each
-part is worth.
+its light cancels; those that face each other have the same radii and every pair its own, so that a
+block has more rings than a pixel. How many taps a pixel takes is decided for tiles of 8 x 8 pixels,
+from their means, before any tap is taken: no tap both decides and estimates. docs/subdermal.md has
+what each part is worth.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ class Subdermal(BurleyFilter):
     """n = fewest + by_spread s + by_unguarded sqrt(u) min(1, s / full_spread) taps, of SETS'.
 
     s: relative spread of the irradiance of the widest channel about the tile; u: the share of skin
-    there that the guard keeps from being averaged. kernel "burley": rings are fitted to Burley's
+    there that the guard keeps from being averaged. Where a block is a single pixel n is `lone`
+    times that, since none of its noise cancels. kernel "burley": rings are fitted to Burley's
     profile; "curve": to the medium's own curve, which few profiles of one parameter can be.
     """
 
@@ -80,7 +82,11 @@ class Subdermal(BurleyFilter):
         1.3, unit="of a tap's radius", low=0.0, high=4.0, source="docs/subdermal.md"
     )
     noise: float = parameter(
-        0.005, unit="see renderer.optics.rings.fit", low=0.0, high=1.0, source="docs/subdermal.md"
+        0.01,
+        unit="over the pixels of a block, see renderer.optics.rings.fit",
+        low=0.0,
+        high=1.0,
+        source="docs/subdermal.md",
     )
     guard_px: float = parameter(
         3.0, unit="pixel widths that are a step of depth", low=0.0, high=1e6, source="Subdermal"
@@ -93,10 +99,24 @@ class Subdermal(BurleyFilter):
         source="docs/subdermal.md",
     )
     sizes: int = parameter(
-        1,
+        2,
         unit="means of falling size that are tried before a pixel",
         low=1,
         high=6,
+        source="docs/subdermal.md",
+    )
+    lone: float = parameter(
+        1.7,
+        unit="of n, where a block is one pixel",
+        low=1.0,
+        high=10.0,
+        source="docs/subdermal.md",
+    )
+    radii: float = parameter(
+        0.6,
+        unit="natural logarithm of the range over which a block spreads a ring's radius",
+        low=0.0,
+        high=2.0,
         source="docs/subdermal.md",
     )
     pyramid: bool = parameter(True, source="taps are means; false: single pixels")
@@ -112,43 +132,65 @@ class Subdermal(BurleyFilter):
         own = (self.fewest, self.by_spread, self.by_unguarded)
         return PRESETS.get(self.preset, own)
 
-    def sets(self, curve: Curve, rung: int) -> list[rings.Rings]:
-        """The fitted rings of every set, for pixels RUNG^rung mm wide."""
-        return [self._rings(curve, count, taps, rung) for count, taps in SETS]
+    def block(self, inputs: Inputs) -> int:
+        """Pixels that share a rotation, along one side."""
+        return inputs.supersample if self.blocks else 1
+
+    def factors(self, block: int) -> np.ndarray:
+        """By what the pairs of a block's pixels that face each other multiply a ring's radius."""
+        pairs = _pairs(block)
+        return np.exp(self.radii * ((np.arange(pairs) + 0.5) / pairs - 0.5))
+
+    def sets(self, curve: Curve, rung: int, block: int) -> list[rings.Rings]:
+        """The fitted rings of every set, for pixels RUNG^rung mm wide in blocks of so many."""
+        own = curve if self.kernel == "curve" else None
+        distances, factors = tuple(self.distances(curve)), tuple(self.factors(block))
+        noise = self.noise / block**2
+        return [
+            _fitted(own, distances, self.scale, count, self._texel(taps), rung, noise, factors)
+            for count, taps in SETS
+        ]
 
     def _texel(self, taps: int) -> float:
         return self.texel / taps**NARROWER if self.pyramid else 0.0
-
-    def _rings(self, curve: Curve, count: int, taps: int, rung: int) -> rings.Rings:
-        own = curve if self.kernel == "curve" else None
-        distances = tuple(self.distances(curve))
-        return _fitted(own, distances, self.scale, count, self._texel(taps), rung, self.noise)
 
     def edge(self, curve: Curve, x_mm: np.ndarray) -> np.ndarray:
         if self.kernel == "curve":
             return curve.edge(np.asarray(x_mm) / self.scale)
         return super().edge(curve, x_mm)
 
-    def taps(self, curve: Curve, rung: int) -> np.ndarray:
-        """The taps of all sets (2, sum of COUNTS, 4): radius, angle, side of the mean and the least
-        radius by which depth is judged, mm; then each channel's weight over Burley's profile there.
+    def taps(self, curve: Curve, rung: int, block: int) -> np.ndarray:
+        """The taps of all sets (2 block^2, sum of COUNTS, 4), two rows for each pixel of a block:
+        radius, cosine and sine of the angle, side of the mean, mm; then each channel's weight over
+        Burley's profile there, and the least radius by which depth is judged, mm.
         """
-        d, pixel = self.distances(curve), RUNG**rung
-        rows: list[tuple[tuple[float, ...], tuple[float, ...]]] = []
-        for (_, taps), fitted in zip(SETS, self.sets(curve, rung), strict=True):
-            for k, (r, weights) in enumerate(zip(fitted.radius_mm, fitted.weights, strict=True)):
-                near = max(r, pixel)
-                profile = (np.exp(-near / d) + np.exp(-near / d / 3)) / (d * near)
-                number = taps if k else 1
-                share = weights / number / np.maximum(profile, LEAST)
-                side = max(self._texel(taps) * r, pixel) if k else 0.0
-                for j in range(number):
-                    turn = 2 * np.pi * (k * GOLDEN + j / number)
-                    rows.append(((r, turn, side, near), (*share, 0.0)))
-        return np.array(rows).transpose(1, 0, 2)
+        d, pixel, factors = self.distances(curve), RUNG**rung, self.factors(block)
+        sets = self.sets(curve, rung, block)
+        table = []
+        for part in range(block**2):
+            # those that face each other are half of all even parts of a turn apart
+            pair = part_of_block(part, block) % len(factors)
+            rows: list[tuple[tuple[float, ...], tuple[float, ...]]] = []
+            for (_, taps), fitted in zip(SETS, sets, strict=True):
+                for k, (ring, weights) in enumerate(
+                    zip(fitted.radius_mm, fitted.weights, strict=True)
+                ):
+                    r = ring * factors[pair if k % 2 else -1 - pair]
+                    near = max(r, pixel)
+                    profile = (np.exp(-near / d) + np.exp(-near / d / 3)) / (d * near)
+                    number = taps if k else 1
+                    share = weights / number / np.maximum(profile, LEAST)
+                    side = max(self._texel(taps) * r, pixel) if k else 0.0
+                    for j in range(number):
+                        turn = 2 * np.pi * (k * GOLDEN + j / number)
+                        place = (r, np.cos(turn), np.sin(turn), side)
+                        rows.append((place, (*share, near)))
+            table.append(np.array(rows).transpose(1, 0, 2))
+        return np.concatenate(table)
 
     def passes(self, canvas: Canvas) -> None:
         inputs, d = canvas.inputs, self.distances(canvas.inputs.curve)
+        block = self.block(inputs)
         size = [-(-side // PAD) * PAD for side in (inputs.width, inputs.height)]
         tiled = [side // TILE for side in size]
         defines = {"TILE": TILE, "SETS": len(SETS)}
@@ -172,7 +214,7 @@ class Subdermal(BurleyFilter):
                     tiles=tiles.textures[0],
                     tile_depths=tiles.textures[1],
                     sigma_mm=self.neighbourhood * float(d.max()),
-                    by=self.counting,
+                    by=np.array(self.counting) * (self.lone if block == 1 else 1.0),
                     full_spread=self.full_spread,
                     counts=np.array(COUNTS, float),
                     ladder=(first, np.log(RUNG)),
@@ -190,7 +232,7 @@ class Subdermal(BurleyFilter):
                     levels=float(LEVELS if self.pyramid else 0),
                     whole=self.whole,
                     sizes=self.sizes,
-                    block=inputs.supersample if self.blocks else 1,
+                    block=block,
                 )
             finally:
                 table.delete()
@@ -201,17 +243,35 @@ class Subdermal(BurleyFilter):
         sizes = np.minimum(depths[depths > 0] / inputs.pixels_per_mm, widest)
         ends = (sizes.min(), sizes.max()) if len(sizes) else (1.0, 1.0)
         low, high = (int(np.floor(np.log(end) / np.log(RUNG) + 0.5)) for end in ends)
-        rows = [self.taps(inputs.curve, rung) for rung in range(low, high + 1)]
+        block = self.block(inputs)
+        rows = [_taps(self, inputs.curve, rung, block) for rung in range(low, high + 1)]
         data = np.concatenate(rows)
         return low, gl.Texture(data.shape[1], len(data), GL.GL_RGBA32F, data=data)
 
     def self_check(self, curve: Curve) -> None:
         widest = float(burley.inverse_cdf(0.9999, float(self.distances(curve).max())))
-        for fitted in self.sets(curve, int(np.log(self.distances(curve).min()) / np.log(RUNG))):
+        rung = int(np.log(self.distances(curve).min()) / np.log(RUNG))
+        for fitted in (one for block in (1, 2) for one in self.sets(curve, rung, block)):
             assert np.allclose(fitted.weights.sum(axis=0), 1, atol=1e-9)
             assert (fitted.weights >= 0).all() and np.isfinite(fitted.radius_mm).all()
             assert fitted.radius_mm[0] == 0 and (np.diff(fitted.radius_mm) > 0).all()
             assert fitted.radius_mm[-1] < 2 * widest
+
+
+def part_of_block(pixel: int, block: int) -> int:
+    """Which even part of the turn between two taps a pixel of a block takes, as in the shader."""
+    return 7 * pixel % block**2
+
+
+def _pairs(block: int) -> int:
+    """Of a block's pixels that face each other; an odd block has none."""
+    return block**2 if block % 2 else block**2 // 2
+
+
+@lru_cache(maxsize=64)
+def _taps(technique: Subdermal, curve: Curve, rung: int, block: int) -> np.ndarray:
+    """`Subdermal.taps`, which takes as long as a pass."""
+    return technique.taps(curve, rung, block)
 
 
 @lru_cache(maxsize=512)
@@ -223,9 +283,10 @@ def _fitted(
     texel: float,
     rung: int,
     noise: float,
+    factors: tuple[float, ...],
 ) -> rings.Rings:
     """Rings fitted to a curve, or to Burley's profile of these distances."""
     d = np.array(distances)
     burleys = fits.BurleyFit(d, np.zeros(len(d)))
     edge = burleys.edge if curve is None else lambda x: curve.edge(x / scale)
-    return rings.fit(edge, d, count, texel, RUNG**rung, noise)
+    return rings.fit(edge, d, count, texel, RUNG**rung, noise, factors)

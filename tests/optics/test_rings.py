@@ -10,13 +10,14 @@ D = fits.burley_distance(SKIN).distance_mm
 BURLEY = fits.BurleyFit(D, np.zeros(3)).edge
 
 
-def drawn_answer(fitted, texel, pixel_mm, x, count=200_000):
+def drawn_answer(fitted, texel, pixel_mm, x, factors, count=200_000):
     """The answer to an edge by drawing points: angle, box and tent of each tap, (N, C)."""
     rng = np.random.default_rng(1)
     total = 0.0
     for r, w in zip(fitted.radius_mm, fitted.weights, strict=True):
-        side = max(texel * r, pixel_mm)
-        at = r * np.cos(2 * np.pi * rng.random(count))
+        drawn = r * rng.choice(factors, count)
+        side = np.maximum(texel * drawn, pixel_mm)
+        at = drawn * np.cos(2 * np.pi * rng.random(count))
         if r:
             at += side * (rng.random(count) - 0.5 + rng.random(count) + rng.random(count) - 1)
         else:
@@ -27,14 +28,14 @@ def drawn_answer(fitted, texel, pixel_mm, x, count=200_000):
 
 
 @pytest.mark.parametrize("count", [2, 4, 6])
-@pytest.mark.parametrize("pixel_mm", [0.05, 0.2])
-def test_what_rings_answer_is_what_points_drawn_from_them_do(count, pixel_mm):
-    fitted = rings.fit(BURLEY, D, count, 1.3, pixel_mm, 0.005)
+@pytest.mark.parametrize(("pixel_mm", "factors"), [(0.05, (0.7, 1.4)), (0.2, (1.0,))])
+def test_what_rings_answer_is_what_points_drawn_from_them_do(count, pixel_mm, factors):
+    fitted = rings.fit(BURLEY, D, count, 1.3, pixel_mm, 0.005, factors)
     assert fitted.radius_mm[0] == 0 and (np.diff(fitted.radius_mm) > 0).all()
     np.testing.assert_allclose(fitted.weights.sum(axis=0), 1, atol=1e-9)
     assert (fitted.weights >= 0).all()
     x = np.linspace(0.3, 10.0, 60)
-    got = drawn_answer(fitted, 1.3, pixel_mm, x)
+    got = drawn_answer(fitted, 1.3, pixel_mm, x, factors)
     rms = np.sqrt(np.trapezoid((got - BURLEY(x)) ** 2, x, axis=0) / np.ptp(x))
     assert (rms < fitted.error + 0.004).all(), (rms, fitted.error)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import renderer
-from renderer.techniques.subdermal import COUNTS, SETS, TILE
+from renderer.techniques.subdermal import COUNTS, SETS, TILE, part_of_block
 from tests.renderer.slab import scatter
 from tests.renderer.test_techniques import SKIN
 
@@ -28,21 +28,53 @@ def pooled(light):
 
 def test_the_sets_are_in_order_and_count_their_taps(bare):
     assert list(COUNTS) == sorted(COUNTS) and COUNTS[0] == 3
-    taps = renderer.make("subdermal").taps(SKIN, -8)
-    assert taps.shape == (2, sum(COUNTS), 4)
+    taps = renderer.make("subdermal").taps(SKIN, -8, 2)
+    assert taps.shape == (8, sum(COUNTS), 4)
     firsts = np.cumsum((0, *COUNTS))[:-1]
     assert (taps[0, firsts, 0] == 0).all() and (np.delete(taps[0, :, 0], firsts) > 0).all()
     assert len(SETS) == len(COUNTS)
 
 
+def test_the_pixels_of_a_block_that_face_each_other_have_the_same_radii(bare):
+    """Half a turn apart; other pairs have radii of their own, whose geometric mean is the ring."""
+    technique = renderer.make("subdermal")
+    radius = technique.taps(SKIN, -8, 2)[::2, :, 0]
+    parts = [part_of_block(pixel, 2) for pixel in range(4)]
+    assert sorted(parts) == [0, 1, 2, 3]
+    by_part = radius[np.argsort(parts)]
+    np.testing.assert_array_equal(by_part[0], by_part[2])
+    np.testing.assert_array_equal(by_part[1], by_part[3])
+    ringed = by_part[0] > 0
+    ratio = by_part[0][ringed] / by_part[1][ringed]
+    np.testing.assert_allclose(np.abs(np.log(ratio)), 0.5 * technique.radii, rtol=1e-9)
+    rings = [r for one in technique.sets(SKIN, -8, 2) for r in one.radius_mm[1:]]
+    mean = np.unique(np.round(np.sqrt(by_part[0] * by_part[1])[ringed], 9))
+    np.testing.assert_allclose(mean, np.unique(np.round(rings, 9)))
+    same = renderer.make("subdermal", {"radii": 0.0}).taps(SKIN, -8, 2)
+    np.testing.assert_array_equal(same[0], same[2])
+
+
+def test_a_block_of_one_pixel_takes_more_taps(bare):
+    inputs = bare.flat(relief(), SKIN, DEPTH, SCALE)
+    counts = {
+        lone: scatter(renderer.make("subdermal", {"lone": lone}), inputs)[1][..., 0].mean()
+        for lone in (1.0, 1.7)
+    }
+    _, block = scatter(renderer.make("subdermal"), replace(inputs, supersample=2))
+    assert block[..., 0].mean() == counts[1.0]
+    assert 1.4 < counts[1.7] / counts[1.0] < 2.0
+
+
 def test_even_light_takes_the_fewest_taps_and_an_edge_more(bare):
     even = np.full((64, 256, 3), 1.3)
-    _, count = scatter(renderer.make("subdermal"), bare.flat(even, SKIN, DEPTH, SCALE))
+    flat = replace(bare.flat(even, SKIN, DEPTH, SCALE), supersample=2)
+    _, count = scatter(renderer.make("subdermal"), flat)
     inner = count[TILE:-TILE, TILE:-TILE, 0]
     assert (inner == 3).all()
     edge = even.copy()
     edge[:, 128:] = 0.1
-    _, count = scatter(renderer.make("subdermal"), bare.flat(edge, SKIN, DEPTH, SCALE))
+    flat = replace(bare.flat(edge, SKIN, DEPTH, SCALE), supersample=2)
+    _, count = scatter(renderer.make("subdermal"), flat)
     columns = count[TILE:-TILE, :, 0]
     assert columns[:, 120:136].min() > 6 and columns[:, 16:40].max() == 3
     tiles = count[..., 0].reshape(64 // TILE, TILE, 256 // TILE, TILE)
@@ -84,7 +116,7 @@ def test_the_guard_keeps_light_from_crossing_a_step_of_depth(bare):
     light[:, 128:] = 3.0
     depth = np.full((128, 256), DEPTH)
     depth[:, 128:] = DEPTH + 30.0
-    inputs = bare.flat(light, SKIN, depth, SCALE)
+    inputs = replace(bare.flat(light, SKIN, depth, SCALE), supersample=2)
     leak = {}
     for name, given in {"guard": {}, "none": {"guard_px": 1e6}}.items():
         out, _ = scatter(renderer.make("subdermal", given), inputs)

@@ -115,8 +115,9 @@ BOUNDS = {
     # sample of either set is as near as Golubev's first, so that blue's edge is wider
     "golubev_plus": (0.010, 0.20, 0.36, 0.015),
     "golubev_adaptive": (0.006, 0.16, 0.16, 0.012),
-    # three taps where light is even: two rings cannot follow red's far end
-    "subdermal": (0.011, 0.16, 0.16, 0.07),
+    # few taps where light is even: few rings cannot follow red's far end, and in a block of one
+    # pixel blue, a pixel wide, is widened for less noise
+    "subdermal": (0.011, 0.18, 0.16, 0.07),
 }
 
 
