@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Self
@@ -23,13 +24,12 @@ from renderer.scene.lights import PointLight
 from renderer.scene.picture import Picture
 from renderer.scene.view import View
 from renderer.techniques.base import Inputs, Room, Technique
+from renderer.techniques.cover import ROUNDING_PX, TILE, Cover
 from renderer.techniques.drawing import RESULT_FORMATS
 
 if TYPE_CHECKING:
     from renderer.renderer import Renderer
 
-#: Of a reach: half a pixel for each of a technique's passes, and one of a derivative.
-ROUNDING_PX = 8
 #: Of linear R, G, B: the weights of composite.frag.
 LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 
@@ -132,10 +132,15 @@ class Frame:
         r = self.renderer
         if not r.has_hair:
             return
-        depths = occlusion.blocks(self.surface.textures[3].read()[::-1, :, 0])
+        depths = occlusion.blocks(self._rows(3, 32 * occlusion.BLOCK))
         sources = (r.context, r.program, r.lamps, r.surroundings, self._shared)
         for hair in r.hair:
             hair.draw(*sources, self.surface, depths)
+
+    def _rows(self, place: int, count: int) -> Iterator[np.ndarray]:
+        """The last channel of one of the shared buffers, so many rows at a time from below."""
+        for low in range(0, self.height, count):
+            yield self.surface.read_rows(place, low, min(low + count, self.height))[..., -1]
 
     def _irradiance(self, diffuse: str) -> gl.Texture:
         """Irradiance below a face of that model, alpha the medium's id."""
@@ -213,8 +218,23 @@ class Frame:
     @cached_property
     def nearest_mm(self) -> float:
         """View depth of the nearest surface that is seen."""
-        depths = self.surface.textures[3].read()
-        return float(depths.min(where=depths > 0, initial=np.inf))
+        rows = self._rows(3, TILE)
+        return min(float(own.min(where=own > 0, initial=np.inf)) for own in rows)
+
+    @cached_property
+    def _tiles(self) -> np.ndarray:
+        """Whether each medium scatters in each tile (media, rows, columns), row 0 below."""
+        rows, columns = -(-self.height // TILE), -(-self.width // TILE)
+        tiles = np.zeros((max(1, len(self.renderer.media)), rows, columns), bool)
+        for row, ids in enumerate(self._rows(0, TILE)):
+            for k, own in enumerate(tiles[:, row]):
+                own[np.flatnonzero((np.rint(ids) == k + 1).any(axis=0)) // TILE] = True
+        return tiles
+
+    def _cover(self, medium: int, piece: Piece) -> Cover:
+        """Where a medium scatters in a piece."""
+        size = (self.width, piece.rows, piece.first, piece.low, piece.high)
+        return Cover(self._tiles[medium - 1], *size, self.view.pixels_per_mm / self.nearest_mm)
 
     def inputs(
         self,
@@ -255,6 +275,7 @@ class Frame:
             piece.first,
             self.height,
             r.executor,
+            self._cover(medium, piece) if irradiance is None else None,
         )
 
     def _seen(self) -> gl.Target:

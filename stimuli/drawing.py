@@ -98,8 +98,8 @@ class Studio:
             if not missing and not task.rounds:
                 continue
             with drawing.frame(cell[0].scene.camera, cell[0].scene.picture) as frame:
-                for stimulus in missing:
-                    self._image(task, stimulus, frame, drawing)
+                for k, stimulus in enumerate(missing):
+                    self._image(task, stimulus, frame, drawing, masked=k > 0)
                     drawn(stimulus)
                 if task.rounds:
                     _time(out, cell, frame, task.rounds)
@@ -130,12 +130,17 @@ class Studio:
             )
         return self._drawing
 
-    def _image(self, task: Task, stimulus: Stimulus, frame: Any, drawing: Any) -> None:
-        """Render one image and record it: it is there whatever comes after."""
+    def _image(
+        self, task: Task, stimulus: Stimulus, frame: Any, drawing: Any, masked: bool
+    ) -> None:
+        """Render one image and record it: it is there whatever comes after. masked: whether the
+        mask of its cell is written already.
+        """
         render, out = task.render, Path(task.out)
         result = frame.render(stimulus.parameters)
         digest = write_png(out / stimulus.file, result.image, render.size)
-        _write_mask(out / manifest.MASKS / f"{stimulus.cell.name}.png", result.samples, render)
+        if not masked:
+            _write_mask(out / manifest.MASKS / f"{stimulus.cell.name}.png", result.samples, render)
         image = entry(
             stimulus,
             render,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -58,24 +59,52 @@ class Mesh:
 
     def draw(self) -> None:
         GL.glBindVertexArray(self.vertex_array)
-        for start in range(0, self.indices, AT_ONCE):
-            if start:
-                finish()
-            count, offset = min(AT_ONCE, self.indices - start), ctypes.c_void_p(4 * start)
-            GL.glDrawElements(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, offset)
+        self._triangles(self.indices)
         if not self.indices:
             GL.glDrawArrays(GL.GL_POINTS, 0, self.vertices)
         GL.glBindVertexArray(0)
+
+    def draw_some(self, faces: np.ndarray) -> None:
+        """Draw triangles (K, 3) of the mesh's vertices in the stead of its own."""
+        faces = np.ascontiguousarray(faces, dtype=np.uint32)
+        GL.glBindVertexArray(self.vertex_array)
+        own = GL.glGetIntegerv(GL.GL_ELEMENT_ARRAY_BUFFER_BINDING)
+        name = GL.glGenBuffers(1)
+        GL.glBindBuffer(GL.GL_ELEMENT_ARRAY_BUFFER, name)
+        GL.glBufferData(GL.GL_ELEMENT_ARRAY_BUFFER, faces.nbytes, faces, GL.GL_STREAM_DRAW)
+        self._triangles(faces.size)
+        GL.glBindBuffer(GL.GL_ELEMENT_ARRAY_BUFFER, own)
+        GL.glBindVertexArray(0)
+        _delete_buffer(name)
+
+    @staticmethod
+    def _triangles(indices: int) -> None:
+        for start in range(0, indices, AT_ONCE):
+            if start:
+                finish()
+            count, offset = min(AT_ONCE, indices - start), ctypes.c_void_p(4 * start)
+            GL.glDrawElements(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, offset)
 
     def delete(self) -> None:
         for handle in self._handles:
             free(handle)
 
 
-def draw_fullscreen(context: Context) -> None:
-    """One triangle over the bound target."""
+def draw_fullscreen(
+    context: Context, windows: Sequence[tuple[int, int, int, int]] | None = None
+) -> None:
+    """One triangle over the bound target; windows (x, y, width, height): over these parts alone,
+    where fragments are what they are over the whole.
+    """
     GL.glBindVertexArray(context.vertex_array)
-    GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+    if windows is None:
+        GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+    else:
+        GL.glEnable(GL.GL_SCISSOR_TEST)
+        for window in windows:
+            GL.glScissor(*window)
+            GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+        GL.glDisable(GL.GL_SCISSOR_TEST)
     GL.glBindVertexArray(0)
 
 

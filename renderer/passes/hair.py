@@ -196,15 +196,19 @@ class Hair:
         """
         matrix = shared["projection"] @ shared["view"]
         size = (surface.width, surface.height)
-        half_mm = 0.5 * self.size * self.strands.width_mm[self.of[self.pieces[:, 0]]]
-        points = self.points[self.pieces]
-        bounds = (points, matrix, size, half_mm, 0.5 * MINIMUM_PX)
-        seen = np.flatnonzero(~occlusion.hidden(depths, *bounds))
+        found = []  # of chunks: what can be seen, and how far it is
+        for start in range(0, len(self.pieces), CHUNK):
+            pieces = self.pieces[start : start + CHUNK]
+            half_mm = 0.5 * self.size * self.strands.width_mm[self.of[pieces[:, 0]]]
+            points = self.points[pieces]
+            bounds = (points, matrix, size, half_mm, 0.5 * MINIMUM_PX)
+            seen = np.flatnonzero(~occlusion.hidden(depths, *bounds))
+            away = points[seen, SEGMENTS // 2] - shared["camera_position"]
+            found.append((start + seen, np.linalg.norm(away, axis=1)))
+        seen, distance = (np.concatenate(each) for each in zip(*found, strict=True))
         if not len(seen):
             return
-        # far pieces first: blended back to front
-        distance = np.linalg.norm(points[seen, SEGMENTS // 2] - shared["camera_position"], axis=1)
-        order = seen[np.argsort(-distance, kind="stable")]
+        order = seen[np.argsort(-distance, kind="stable")]  # far ones first: blended back to front
         with self.shade(context, programs, lamps, surroundings, shared) as shaded:
             surface.bind(depth_test=True, blend="over", only=1)
             program = programs("passes/hair.frag", {"LAMP": 0}, vertex="passes/hair.vert")

@@ -21,6 +21,20 @@ STRAND_SHARE = 2  # the maps of hair have so many times fewer pixels a side
 LEAST_MM = 0.03  # thinner strands, vellus, cast no shadow
 MARGIN_MM = 2.0  # around what is seen from a distant lamp
 NEAREST_MM = 1.0  # of a cone's depths
+#: Uniforms that have one entry a lamp.
+PER_LAMP = (
+    "lamp_place",
+    "lamp_irradiance",
+    "lamp_falloff",
+    "lamp_cone",
+    "lamp_ramp",
+    "lamp_size",
+    "lamp_search",
+    "lamp_layer",
+    "lamp_faces",
+    "strand_layer",
+    "strand_faces",
+)
 _CUBE = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
 
 
@@ -198,6 +212,15 @@ class Lamps:
         self.solid.delete()
         self.strands.delete()
         self.sums.delete()
+
+
+def of_lamps(uniforms: dict, lamps: Sequence[int]) -> dict:
+    """What of `Lamps.uniforms` changes so that just these lamps shine, by their numbers: the others
+    are moved behind them, where shaders do not look.
+    """
+    count = len(uniforms["lamp_place"])
+    order = [*lamps, *(k for k in range(count) if k not in lamps)]
+    return {"lamps": len(lamps), **{name: uniforms[name][order] for name in PER_LAMP}}
 
 
 def _falloff(light: Light) -> tuple[float, float, float, float]:

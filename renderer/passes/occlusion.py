@@ -7,6 +7,8 @@ of four depths replaced by the farthest of them, level by level.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 #: Pixels of a side of the finest blocks.
@@ -17,14 +19,15 @@ PADDING_PX = 2.0
 MARGIN_MM = 0.2
 
 
-def blocks(depths: np.ndarray) -> list[np.ndarray]:
+def blocks(bands: Iterable[np.ndarray]) -> list[np.ndarray]:
     """Farthest view depths of blocks of BLOCK, 2 BLOCK, ... pixels, infinite where one shows the
     backdrop.
 
-    depths (H, W): view depths in mm, 0 for the backdrop; row 0 at the bottom.
+    bands (H, W): rows of view depths in mm, 0 for the backdrop, the lowest first; all but the last
+    are whole blocks high.
     """
-    seen = np.where(depths > 0, depths, np.inf).astype(np.float32)
-    levels = [_farthest(seen, BLOCK)]
+    finest = [_farthest(np.where(band > 0, band, np.float32(np.inf)), BLOCK) for band in bands]
+    levels = [np.vstack(finest)]
     while max(levels[-1].shape) > 1:
         levels.append(_farthest(levels[-1], 2))
     return levels
@@ -50,14 +53,18 @@ def hidden(
     matrix (4, 4): world to clip space, w being view depth; size: (width, height) of the image in
     pixels; half_mm (S,), half_px: half the width of what is drawn around them, whichever is more.
     """
-    clip = points @ matrix[[0, 1, 3], :3].T + matrix[[0, 1, 3], 3]
+    strands, count, _ = points.shape
+    along = np.swapaxes(points, 0, 1).reshape(-1, 3)  # points of a place along the strands together
+    clip = along @ matrix[[0, 1, 3], :3].T + matrix[[0, 1, 3], 3]
+    clip = clip.reshape(count, strands, 3)
     depth = clip[..., 2]
-    near, behind_the_eye = depth.min(axis=1), (depth <= 0).any(axis=1)
+    near = depth.min(axis=0)
+    behind_the_eye = near <= 0
     with np.errstate(divide="ignore", invalid="ignore"):
         at = 0.5 * (clip[..., :2] / depth[..., None] + 1.0) * np.array(size)
         scale = 0.5 * size[1] * np.linalg.norm(matrix[1, :3]) / near
         around = PADDING_PX + np.maximum(half_px, half_mm * scale)
-        low, high = at.min(axis=1) - around[:, None], at.max(axis=1) + around[:, None]
+        low, high = at.min(axis=0) - around[:, None], at.max(axis=0) + around[:, None]
     inside = ~behind_the_eye & (high > 0).all(axis=1) & (low < np.array(size)).all(axis=1)
     result = ~inside & ~behind_the_eye
     which = np.flatnonzero(inside)

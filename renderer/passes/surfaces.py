@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,10 @@ from renderer.optics import media, surface
 from renderer.optics import skin as spectral
 from renderer.optics.curve import Curve
 from renderer.optics.transmittance import TABLE, THICKNESS, Translucency, curve_of
+from renderer.passes import facing
 from renderer.passes.bake import Baked, Body, bake, body
 from renderer.passes.environment import Surroundings
-from renderer.passes.lamps import Lamps
+from renderer.passes.lamps import Lamps, of_lamps
 from renderer.passes.points import COLUMNS, MOST_TRIANGLES, Points, SurfaceLists
 from renderer.scene import lights as lamps_of_a_scene
 from renderer.scene import maps as maps_of_a_scene
@@ -110,6 +112,14 @@ class Drawn:
     maps: dict[str, gl.Texture] | None = None
     lists: SurfaceLists | None = None
     gaze: np.ndarray | None = None
+
+    @cached_property
+    def corners(self) -> facing.Corners:
+        """The surface's triangles as lamps see them."""
+        part = self.item.primitive
+        return facing.Corners(
+            self.item.in_world(part.positions), self.item.turned(part.normals), part.faces
+        )
 
 
 class Surfaces:
@@ -225,8 +235,13 @@ class Surfaces:
             shader = "passes/local.frag" if local else "passes/skin.frag"
             vertex = "passes/surface.vert" if points is None else "shaders/fullscreen.vert"
             program = programs(shader, own, vertex=vertex)
-            through = self._through(drawn, translucency)
-            program.use(**program.accepts({**values, **self._material(drawn), **through}))
+            own_values = {**self._material(drawn), **self._through(drawn, translucency)}
+            if domain == "SCREEN" and not local:
+                can = drawn.corners.lit(lamps.lights)
+                can |= drawn.corners.behind(shared["camera_position"])
+                _draw_groups(drawn, can, program, values, own_values)
+                continue
+            program.use(**program.accepts({**values, **own_values}))
             if points is None:
                 drawn.mesh.draw()
             else:
@@ -290,9 +305,10 @@ class Surfaces:
         for drawn in self.surfaces:
             if drawn.id:
                 through = self._through(drawn, translucency)
-                own = {**values, "model": drawn.item.pose, **through, **self.flesh(drawn)}
-                program.use(**program.accepts(own))
-                drawn.mesh.draw()
+                own = {"model": drawn.item.pose, **through, **self.flesh(drawn)}
+                can = drawn.corners.lit_through(lamps.lights, translucency.wrap)
+                can |= drawn.corners.behind(shared["camera_position"])
+                _draw_groups(drawn, can, program, values, own, unlit=False)
 
     def _through(self, drawn: Drawn, translucency: Translucency | None) -> dict:
         """The uniforms of passes/transmission.glsl for a surface."""
@@ -431,6 +447,20 @@ class Surfaces:
             attributes = _attributes(part, part.masks, light, openness, scatters)
             drawn.lists = SurfaceLists(attributes | {9: drawn.baked.sky}, part.faces)
         return Points(drawn.lists, faces, weights, columns)
+
+
+def _draw_groups(
+    drawn: Drawn, can: np.ndarray, program: gl.Program, values: dict, own: dict, unlit: bool = True
+) -> None:
+    """Draw a surface, each triangle with the lamps that matter to it.
+
+    can (lamps, M): whether a lamp does; values: with those of all lamps; unlit: also what none does.
+    """
+    for group in facing.groups(drawn.item.primitive.faces, can):
+        if unlit or group.lamps:
+            chosen = {**values, **of_lamps(values, group.lamps), **own}
+            program.use(**program.accepts(chosen))
+            drawn.mesh.draw_some(group.faces)
 
 
 def _baked(

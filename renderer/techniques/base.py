@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from renderer.passes.points import Points
     from renderer.passes.surfaces import Drawn
     from renderer.scene.lights import Light
+    from renderer.techniques.cover import Cover
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Inputs:
     distance. supersample: pixels of this resolution per output pixel, along one side. curve: the
     medium's reference curve. room: the surfaces of the medium themselves, for techniques that work
     over another domain than the screen. executor: for work that does not draw, None: this process.
+    cover: where anything scatters, None: anywhere.
     """
 
     context: object
@@ -52,6 +54,7 @@ class Inputs:
     first_row: int = 0
     image_height: int = 0
     executor: Executor | None = None
+    cover: Cover | None = None
 
     @property
     def image_size(self) -> tuple[int, int]:

@@ -10,6 +10,7 @@ from renderer import gl
 from renderer.gl import GL
 from renderer.passes.surfaces import Drawn
 from renderer.techniques.base import Inputs, Room
+from renderer.techniques.cover import Window
 
 #: Of every technique's result: scattered irradiance, then samples and contrast.
 RESULT_FORMATS = (GL.GL_RGBA32F, GL.GL_RG16F)
@@ -68,14 +69,15 @@ class Drawing:
         shader: str,
         defines: dict[str, Any] | None = None,
         blend: str | None = None,
+        windows: list[Window] | None = None,
         **uniforms,
     ) -> None:
-        """One pass over the whole of a target."""
+        """One pass over the whole of a target, or over windows of it."""
         program = self.inputs.programs(shader, defines)
         with gl.timed(self.inputs.context, shader):
             into.bind(blend=blend)
             program.use(**{**program.accepts(self.given), **uniforms})
-            gl.draw_fullscreen(self.inputs.context)
+            gl.draw_fullscreen(self.inputs.context, windows)
 
     def __enter__(self) -> Self:
         return self

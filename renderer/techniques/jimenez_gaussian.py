@@ -10,7 +10,7 @@ and its derivative.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
@@ -81,8 +81,12 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
     def support_mm(self, curve: Curve) -> float | None:
         if self.alpha:
             return None  # its widths are no millimetres
-        _, spacing, _ = self.axis_taps()
         blurs, _ = self.blurs(self.fit(curve))
+        return self._reach_mm(blurs)
+
+    def _reach_mm(self, blurs: list[tuple[float, Any]]) -> float:
+        """How far blurs of a sigma in mm and a weight reach, one after the other."""
+        _, spacing, _ = self.axis_taps()
         return len(TAPS) // 2 * spacing * sum(sigma for sigma, _ in blurs)
 
     def passes(self, canvas: Canvas) -> None:
@@ -103,11 +107,13 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
         }
         row, blurred = canvas.target(), canvas.target()
         start = {"light": inputs.irradiance, "unblurred": unblurred, "samples": self.reads()}
-        canvas.draw(canvas.result, START, **start)
+        canvas.filter(canvas.result, START, **start)
         source = inputs.irradiance
+        reach_mm = self._reach_mm(blurs)
         for sigma, weight in blurs:
-            own = {**common, "sigma": sigma}
-            canvas.draw(row, self.file(), source=source, axis=(1.0, 0.0), **own)
-            canvas.draw(blurred, self.file(), source=row.textures[0], axis=(0.0, 1.0), **own)
+            own = {**common, "sigma": sigma, "reach_mm": reach_mm}
+            canvas.filter(row, self.file(), source=source, axis=(1.0, 0.0), **own)
+            reach_mm = own["reach_mm"] = max(reach_mm - self._reach_mm([(sigma, weight)]), 0.0)
+            canvas.filter(blurred, self.file(), source=row.textures[0], axis=(0.0, 1.0), **own)
             source = blurred.textures[0]
-            canvas.draw(canvas.result, ADD, blend="add", source=source, weight=weight)
+            canvas.filter(canvas.result, ADD, blend="add", source=source, weight=weight)

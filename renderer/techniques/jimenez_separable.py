@@ -203,8 +203,16 @@ class JimenezSeparable(RotatedTechnique):
         }
         row = canvas.target()
         defines = {"TAPS": self.taps}
-        canvas.draw(row, self.file(), defines, source=inputs.irradiance, axis=(1.0, 0.0), **common)
-        canvas.draw(
+        canvas.filter(
+            row,
+            self.file(),
+            defines,
+            reach_mm=self.support_mm(inputs.curve),
+            source=inputs.irradiance,
+            axis=(1.0, 0.0),
+            **common,
+        )
+        canvas.filter(
             canvas.result,
             self.file(),
             defines,

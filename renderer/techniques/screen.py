@@ -13,6 +13,9 @@ from renderer import gl
 from renderer.techniques.base import Inputs, Scattered, Technique
 from renderer.techniques.drawing import Drawing, result
 
+#: What a pixel that does not scatter is after any pass: its own irradiance, and no samples.
+LEFT_ALONE = "techniques/none.glsl"
+
 
 class Canvas(Drawing):
     """The picture: the result, and what every pass is given that has a uniform of that name."""
@@ -22,6 +25,28 @@ class Canvas(Drawing):
         self.result = result
         names = ("irradiance", "depths", "pixels_per_mm", "image_size", "first_row")
         self.given = {name: getattr(inputs, name) for name in names}
+        self._begun: set[int] = set()
+
+    def filter(
+        self,
+        into: gl.Target,
+        shader: str,
+        defines: dict[str, Any] | None = None,
+        blend: str | None = None,
+        reach_mm: float = 0.0,
+        **uniforms,
+    ) -> None:
+        """A pass that leaves light as it is where nothing scatters, and counts no samples there: it
+        is drawn where something does. reach_mm: from how far passes after it take light.
+        """
+        cover = self.inputs.cover
+        if cover is None:
+            self.draw(into, shader, defines, blend, **uniforms)
+            return
+        if into.id not in self._begun:
+            self._begun.add(into.id)
+            self.draw(into, LEFT_ALONE, windows=cover.rest())
+        self.draw(into, shader, defines, blend, cover.scattering(reach_mm), **uniforms)
 
 
 @dataclass(frozen=True)
@@ -45,7 +70,7 @@ class ScreenTechnique(Technique):
     def passes(self, canvas: Canvas) -> None:
         """Draw into canvas.result."""
         uniforms = self.uniforms(canvas.inputs)
-        canvas.draw(canvas.result, self.file(), self.defines(), **uniforms)
+        canvas.filter(canvas.result, self.file(), self.defines(), **uniforms)
 
     def draw(self, canvas: Canvas) -> None:
         """Draw into canvas.result: the passes once; a base that needs them oftener overrides it."""

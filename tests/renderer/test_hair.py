@@ -129,7 +129,7 @@ def test_what_is_said_to_be_hidden_is():
     xy = xy + rng.uniform(1, 12, (count, 1, 1)) * rng.normal(size=(count, 4, 2))
     points = np.concatenate([xy * depth[..., None] / pixels_per_mm, -depth[..., None]], axis=2)
     half = np.full(count, 0.5)
-    levels = occlusion.blocks(depths)
+    levels = occlusion.blocks([depths])
     hidden = occlusion.hidden(levels, points, projection, (width, height), half, 1.0)
     at = xy + np.array([width, height]) / 2
     for k in np.flatnonzero(hidden):
@@ -145,7 +145,7 @@ def test_what_is_said_to_be_hidden_is():
 
 
 def test_what_passes_the_eye_is_never_hidden():
-    levels = occlusion.blocks(np.full((16, 16), 10.0, np.float32))
+    levels = occlusion.blocks([np.full((16, 16), 10.0, np.float32)])
     projection = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, -1.2, -2.2], [0, 0, -1.0, 0]])
     points = np.array([[[0, 0, -50.0], [0, 0, 5.0]], [[0, 0, -50.0], [0, 0, -60.0]]])
     hidden = occlusion.hidden(levels, points, projection, (16, 16), np.full(2, 0.1), 0.5)
