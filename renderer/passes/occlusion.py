@@ -53,18 +53,20 @@ def hidden(
     matrix (4, 4): world to clip space, w being view depth; size: (width, height) of the image in
     pixels; half_mm (S,), half_px: half the width of what is drawn around them, whichever is more.
     """
-    strands, count, _ = points.shape
-    along = np.swapaxes(points, 0, 1).reshape(-1, 3)  # points of a place along the strands together
-    clip = along @ matrix[[0, 1, 3], :3].T + matrix[[0, 1, 3], 3]
-    clip = clip.reshape(count, strands, 3)
-    depth = clip[..., 2]
+    x, y, z = np.moveaxis(points, 2, 0).swapaxes(1, 2).astype(np.float32)  # each (P, S)
+    # no matrix product: what that runs on several threads takes more of them than it saves
+    across, up, depth = (
+        a * x + b * y + c * z + d for a, b, c, d in matrix[[0, 1, 3]].astype(np.float32)
+    )
     near = depth.min(axis=0)
     behind_the_eye = near <= 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        at = 0.5 * (clip[..., :2] / depth[..., None] + 1.0) * np.array(size)
         scale = 0.5 * size[1] * np.linalg.norm(matrix[1, :3]) / near
         around = PADDING_PX + np.maximum(half_px, half_mm * scale)
-        low, high = at.min(axis=0) - around[:, None], at.max(axis=0) + around[:, None]
+        low, high = np.empty((2, len(near), 2))
+        for k, (side, along) in enumerate(zip(size, (across, up), strict=True)):
+            at = 0.5 * side * (along / depth + 1.0)
+            low[:, k], high[:, k] = at.min(axis=0) - around, at.max(axis=0) + around
     inside = ~behind_the_eye & (high > 0).all(axis=1) & (low < np.array(size)).all(axis=1)
     result = ~inside & ~behind_the_eye
     which = np.flatnonzero(inside)

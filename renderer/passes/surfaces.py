@@ -454,7 +454,7 @@ def _draw_groups(
 ) -> None:
     """Draw a surface, each triangle with the lamps that matter to it.
 
-    can (lamps, M): whether a lamp does; values: with those of all lamps; unlit: also what none does.
+    can (lamps, M): whether a lamp does; values: with all lamps; unlit: with what none does.
     """
     for group in facing.groups(drawn.item.primitive.faces, can):
         if unlit or group.lamps:
