@@ -87,7 +87,7 @@ class Frame:
 
     def _name(self, what: object) -> str | None:
         """What buffers of this view are kept by; None where nothing is kept."""
-        if self.renderer.kept_as is None:
+        if "views" not in self.renderer.keep:
             return None
         size = (self.width, self.height)
         return kept.view_key(self.renderer.kept_as, what, *self._shared.values(), size)

@@ -21,6 +21,7 @@ from renderer.passes.surfaces import Drawn
 from renderer.scene.graph import Contents
 
 ROOT = Path(__file__).parent
+CACHES = ("shadows", "views")
 #: Folders whose files are hashed, and files beside them.
 FOLDERS = ("gl", "optics", "passes", "scene", "shaders")
 FILES = ("frame.py", "kept.py", "renderer.py")

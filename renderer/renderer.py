@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from concurrent.futures import Executor
 from functools import cached_property
 from typing import Self
@@ -45,8 +46,8 @@ class Renderer:
     scene: a renderer.scene.graph.SceneGraph, or any pyrender.Scene. size: (width, height) of the
     images; supersample: 1 to 4 samples a pixel along each side; seed: of the solid noise and of
     the baked light; rays: of the bake, per vertex; shadow_map: pixels of a lamp's map; executor:
-    walks for the technique `reference`, without it this process does; keep: whether shadow maps and
-    frames' buffers are kept in the caches `shadows` and `views`, and read from there.
+    walks for the technique `reference`, without it this process does; keep: which of kept.CACHES
+    are read and written, `shadows` for the lamps' maps, `views` for frames' buffers.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class Renderer:
         rays: int = 144,
         shadow_map: int = SHADOW_MAP,
         executor: Executor | None = None,
-        keep: bool = False,
+        keep: Collection[str] = (),
     ):
         width, height = size
         if min(width, height) < 16 or max(width, height) * supersample > SIZE_LIMIT:
@@ -66,6 +67,9 @@ class Renderer:
                 f"size is {width}x{height} at supersample {supersample}; expected 16 to "
                 f"{SIZE_LIMIT // max(supersample, 1)} pixels a side"
             )
+        if unknown := set(keep) - set(kept.CACHES):
+            known = ", ".join(kept.CACHES)
+            raise InputError(f"keep has {', '.join(sorted(unknown))}; expected some of {known}")
         if supersample not in (1, 2, 3, 4):
             raise InputError(f"supersample is {supersample!r}; expected 1, 2, 3 or 4")
         contents = graphs.contents(scene)
@@ -80,8 +84,9 @@ class Renderer:
             self._programs: dict = {}
             self.surroundings = Surroundings(contents.environment)
             self.surfaces = Surfaces(contents, contents.lights, self.surroundings, rays, seed)
-            self.kept_as = self._key(rays) if keep else None
-            if not keep:
+            self.keep = frozenset(keep)
+            self.kept_as = self._key(rays) if keep else ""
+            if "views" not in keep:
                 self.light_up()
         except BaseException:
             self.close()
@@ -127,12 +132,13 @@ class Renderer:
         """
         strands = np.vstack([np.empty((0, 3)), *(hair.casting(LEAST_MM) for hair in self.hair)])
         lamps = Lamps(self._contents.lights, self._everything(), strands, self._shadow_map)
-        if self.kept_as and kept.load_shadows(self.kept_as, lamps, self.hair):
+        keeps = "shadows" in self.keep
+        if keeps and kept.load_shadows(self.kept_as, lamps, self.hair):
             return lamps
         lamps.draw(self.program, self.surfaces, self.hair)
         for hair in self.hair:
             hair.light(self.context, self.program, lamps, self.surroundings)
-        if self.kept_as:
+        if keeps:
             kept.keep_shadows(self.kept_as, lamps, self.hair)
         return lamps
 

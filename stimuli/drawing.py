@@ -120,6 +120,7 @@ class Studio:
                     size=render.size,
                     supersample=render.supersample,
                     seed=render.seed,
+                    keep=("shadows",),  # a view is drawn once, a scene by every worker
                 )
             )
             self._wanted = wanted

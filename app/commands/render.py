@@ -150,7 +150,7 @@ def command(
             supersample=supersample,
             seed=seed,
             executor=crew.executor,
-            keep=True,
+            keep=("shadows", "views"),
         ) as drawing,
         drawing.frame() as frame,
     ):

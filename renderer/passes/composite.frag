@@ -6,7 +6,7 @@ uniform sampler2D scattered; uniform sampler2D specular; uniform sampler2D albed
 uniform float exposure; uniform float saturation; uniform float power;
 uniform float conserving;  // 1: what the face sends back inside does not get out
 uniform float texturing;  // the power of the albedo that is in the scattered light already
-uniform int tone_map; uniform int backdrop;  // places in the lists of renderer/scene/picture.py
+// TONE_MAP and BACKDROP are places in the lists of renderer/scene/picture.py: constants, since software drivers take every branch.
 uniform mat3 rays;                           // normalised device coordinates to directions in the world
 uniform vec3 backdrop_centre; uniform vec3 backdrop_edge;
 uniform float aspect;
@@ -43,10 +43,15 @@ vec3 neutral(vec3 x) {
 }
 
 vec3 toned(vec3 x) {
-    if (tone_map == 0) x = filmic(x);
-    else if (tone_map == 1) x = hable(x);
-    else if (tone_map == 3) x = agx(x);
-    else if (tone_map == 4) x = neutral(x);
+#if TONE_MAP == 0
+    x = filmic(x);
+#elif TONE_MAP == 1
+    x = hable(x);
+#elif TONE_MAP == 3
+    x = agx(x);
+#elif TONE_MAP == 4
+    x = neutral(x);
+#endif
     x = clamp(x, 0.0, 1.0);
     if (saturation != 1.0) x = clamp(mix(vec3(dot(x, vec3(0.2126, 0.7152, 0.0722))), x, saturation), 0.0, 1.0);
     return power == 1.0 ? x : pow(x, vec3(power));
@@ -55,8 +60,11 @@ vec3 toned(vec3 x) {
 vec3 behind() {
     vec2 uv = image_pixel() / image_size;
     vec2 d = (uv - vec2(0.5, 0.52)) * vec2(aspect, 1.0);
-    if (backdrop == 0) return mix(backdrop_centre, backdrop_edge, smoothstep(0.0, 1.0, length(d)));
+#if BACKDROP == 0
+    return mix(backdrop_centre, backdrop_edge, smoothstep(0.0, 1.0, length(d)));
+#else
     return environment(normalize(rays * vec3(uv * 2.0 - 1.0, 1.0)), 4096.0);
+#endif
 }
 
 void main() {

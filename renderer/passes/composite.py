@@ -57,15 +57,17 @@ def composite(
         "saturation": picture.saturation,
         "power": picture.power,
         **AGX,
-        "tone_map": TONE_MAPS.index(picture.tone_map),
-        "backdrop": BACKDROPS.index(picture.backdrop),
         "backdrop_centre": picture.centre,
         "backdrop_edge": picture.edge,
         "aspect": width / height,
         "rays": view.rays(),
         **surroundings.uniforms(),
     }
-    program = programs("passes/composite.frag", surroundings.defines())
+    chosen = {
+        "TONE_MAP": TONE_MAPS.index(picture.tone_map),
+        "BACKDROP": BACKDROPS.index(picture.backdrop),
+    }
+    program = programs("passes/composite.frag", surroundings.defines() | chosen)
     rows = piece.high - piece.low
     size = (width // supersample, rows // supersample)
     with gl.Target(width, rows, [GL.GL_RGBA16F]) as colour:

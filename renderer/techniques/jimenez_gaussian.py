@@ -103,8 +103,11 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
             "beta": self.beta,
             "gradient_limit": self.gradient_limit,
             "supersample": float(inputs.supersample),
-            "follow": 1 / self.follow_surface_mm if self.depth_steps == "follow" else 0.0,
         }
+        follows = self.depth_steps == "follow"
+        if follows:
+            common["follow"] = 1 / self.follow_surface_mm
+        blur = (self.file(), {"FOLLOW": int(follows)})
         row, blurred = canvas.target(), canvas.target()
         start = {"light": inputs.irradiance, "unblurred": unblurred, "samples": self.reads()}
         canvas.filter(canvas.result, START, **start)
@@ -112,8 +115,8 @@ class JimenezGaussian(SumOfGaussians, ScreenTechnique):
         reach_mm = self._reach_mm(blurs)
         for sigma, weight in blurs:
             own = {**common, "sigma": sigma, "reach_mm": reach_mm}
-            canvas.filter(row, self.file(), source=source, axis=(1.0, 0.0), **own)
+            canvas.filter(row, *blur, source=source, axis=(1.0, 0.0), **own)
             reach_mm = own["reach_mm"] = max(reach_mm - self._reach_mm([(sigma, weight)]), 0.0)
-            canvas.filter(blurred, self.file(), source=row.textures[0], axis=(0.0, 1.0), **own)
+            canvas.filter(blurred, *blur, source=row.textures[0], axis=(0.0, 1.0), **own)
             source = blurred.textures[0]
             canvas.filter(canvas.result, ADD, blend="add", source=source, weight=weight)

@@ -38,7 +38,7 @@ def graph_of(light=3.0, medium="skin"):
 
 
 @contextmanager
-def opened(graph=None, keep=True):
+def opened(graph=None, keep=kept.CACHES):
     with renderer.Renderer(graph or graph_of(), (96, 64), 2, 0, 4, 256, keep=keep) as drawing:
         yield drawing
 
@@ -58,7 +58,7 @@ TECHNIQUES = [
 
 
 def test_what_was_kept_is_what_was_drawn_to_the_bit(monkeypatch, folder):
-    with opened(keep=False) as drawing:
+    with opened(keep=()) as drawing:
         plain = drawn(drawing, *TECHNIQUES)
     with opened() as drawing:
         first = drawn(drawing, *TECHNIQUES)
@@ -80,7 +80,7 @@ def test_what_was_kept_is_what_was_drawn_to_the_bit(monkeypatch, folder):
 
 def test_another_camera_has_buffers_of_its_own_and_the_same_maps(folder, monkeypatch):
     other = replace(CAMERA, yaw_deg=-30.0)
-    with opened(keep=False) as drawing:
+    with opened(keep=()) as drawing:
         plain = drawn(drawing, camera=other)
     with opened() as drawing:
         drawn(drawing)
@@ -93,7 +93,9 @@ def test_another_camera_has_buffers_of_its_own_and_the_same_maps(folder, monkeyp
 
 def test_a_key_follows_all_that_a_scene_has():
     def key(graph, **changed):
-        with renderer.Renderer(graph, (32, 32), 1, 0, 4, 64, keep=True, **changed) as drawing:
+        with renderer.Renderer(
+            graph, (32, 32), 1, 0, 4, 64, keep=kept.CACHES, **changed
+        ) as drawing:
             return drawing.kept_as
 
     keys = [key(graph_of()), key(graph_of(light=2.0)), key(graph_of(medium="marble"))]
@@ -117,7 +119,7 @@ def test_half_a_file_is_drawn_anew(folder):
 
 
 def test_nothing_is_kept_without_being_asked(folder):
-    with opened(keep=False) as drawing:
+    with opened(keep=()) as drawing:
         drawn(drawing)
     assert not (folder / "views").exists() and not (folder / "shadows").exists()
 
