@@ -179,6 +179,12 @@ class Frame:
             self._transmitted[translucency] = target
         return self._transmitted[translucency].textures[0]
 
+    def _light_for(self, technique: Technique) -> None:
+        """Draw what of a technique's light takes the lamps' maps."""
+        if through := technique.transmission:
+            self.transmitted(through)
+        self._irradiance(technique.diffuse)
+
     def irradiance(
         self,
         translucency: Translucency | None = None,
@@ -338,6 +344,9 @@ class Frame:
         image = np.empty((self.height // s, self.width // s, 3), kind)
         samples = np.empty((self.height, self.width), np.uint16)
         contrast = np.empty(samples.shape, np.float32) if technique.measures_contrast else None
+        if technique.domain == "screen":
+            self._light_for(technique)
+            r.put_by()
         for piece in self.pieces(technique):
             with self.scatter(technique, piece) as scattered:
                 light, info = scattered.textures

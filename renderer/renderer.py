@@ -147,6 +147,17 @@ class Renderer:
         _ = self.lamps
         give_back()
 
+    def put_by(self) -> None:
+        """Free the lamps' maps and the hair where all that they are for is kept: whoever asks for
+        them after all has them read from there.
+        """
+        if self.keep.issuperset(kept.CACHES):
+            for name in ("lamps", "hair"):
+                self.__dict__.pop(name, None)
+            gl.draw_nothing()  # which was drawn with them
+            self.context.free_dropped()
+            give_back()
+
     @property
     def lights(self) -> list[Light]:
         """The scene's lamps as values."""

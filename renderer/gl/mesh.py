@@ -65,7 +65,9 @@ class Mesh:
         GL.glBindVertexArray(0)
 
     def draw_some(self, faces: np.ndarray) -> None:
-        """Draw triangles (K, 3) of the mesh's vertices in the stead of its own."""
+        """Draw triangles (K, 3) of the mesh's vertices in the stead of its own, and wait: a software
+        driver keeps what is still to be drawn.
+        """
         faces = np.ascontiguousarray(faces, dtype=np.uint32)
         GL.glBindVertexArray(self.vertex_array)
         own = GL.glGetIntegerv(GL.GL_ELEMENT_ARRAY_BUFFER_BINDING)
@@ -73,6 +75,7 @@ class Mesh:
         GL.glBindBuffer(GL.GL_ELEMENT_ARRAY_BUFFER, name)
         GL.glBufferData(GL.GL_ELEMENT_ARRAY_BUFFER, faces.nbytes, faces, GL.GL_STREAM_DRAW)
         self._triangles(faces.size)
+        finish()
         GL.glBindBuffer(GL.GL_ELEMENT_ARRAY_BUFFER, own)
         GL.glBindVertexArray(0)
         _delete_buffer(name)
