@@ -65,8 +65,8 @@ class Mesh:
         GL.glBindVertexArray(0)
 
     def draw_some(self, faces: np.ndarray) -> None:
-        """Draw triangles (K, 3) of the mesh's vertices in the stead of its own, and wait: a software
-        driver keeps what is still to be drawn.
+        """Draw triangles (K, 3) of the mesh's vertices in the stead of its own, and wait: software
+        drivers keep what is still to be drawn.
         """
         faces = np.ascontiguousarray(faces, dtype=np.uint32)
         GL.glBindVertexArray(self.vertex_array)
