@@ -136,6 +136,7 @@ class Frame:
         sources = (r.context, r.program, r.lamps, r.surroundings, self._shared)
         for hair in r.hair:
             hair.draw(*sources, self.surface, depths)
+            hair.rest()
 
     def _rows(self, place: int, count: int) -> Iterator[np.ndarray]:
         """The last channel of one of the shared buffers, so many rows at a time from below."""

@@ -1,4 +1,4 @@
-"""What is not drawn adds nothing: pictures are the same to the byte with all lamps and all tiles."""
+"""What is not drawn adds nothing: pictures are the same with all lamps and over all tiles."""
 
 import numpy as np
 import pytest
