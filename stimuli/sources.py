@@ -24,12 +24,16 @@ SHARED = ("renderer.renderer", "stimuli.scenes.staging")
 def _imports(path: Path) -> frozenset[str]:
     """The dotted names that a file imports from the packages that draw."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    waiting = list(ast.parse(path.read_bytes()).body)
+    while waiting:  # statements alone: most of a file's nodes are in expressions
+        node = waiting.pop()
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names.add(node.module)
             names.update(f"{node.module}.{alias.name}" for alias in node.names)
+        for held in ("body", "orelse", "finalbody", "handlers", "cases"):
+            waiting += getattr(node, held, ())
     return frozenset(n for n in names if n.split(".")[0] in ("renderer", "stimuli"))
 
 
