@@ -127,6 +127,7 @@ class FakeRenderer:
     size: tuple
     supersample: int
     seed: int
+    keep: tuple = ()
     driver = "fake"
     drawn = []
     frames = []
