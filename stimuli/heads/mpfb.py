@@ -102,7 +102,7 @@ def lower_arms(data: Path, base: Base, positions: np.ndarray, degrees: float) ->
                     break
                 inside |= more
             weight = np.zeros(len(positions))
-            for name in inside & weights.keys():
+            for name in sorted(inside & weights.keys()):  # a sum's last bit is its order's
                 table = np.array(weights[name])
                 np.add.at(weight, table[:, 0].astype(int), table[:, 1])
             cube = bones[bone]["head"]["cube_name"]

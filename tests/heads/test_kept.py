@@ -1,6 +1,9 @@
 """A generated person that was kept is the one that was made."""
 
 import dataclasses
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -53,3 +56,25 @@ def test_a_person_comes_back_as_they_were_made(cache, monkeypatch):
         with pytest.raises(TypeError):  # neither seed nor colours are left out of the key
             kept.person_model(*other)
     assert len(list(cache.iterdir())) == 1
+
+
+def test_arms_are_the_same_to_the_bit_in_every_process():
+    """Light is kept by the content of what it falls on: one bit would have it baked anew."""
+    code = """
+import hashlib
+from stimuli.heads import fetch, mpfb
+data = fetch.mpfb_data()
+base = mpfb.read_base(data)
+print(hashlib.sha256(mpfb.lower_arms(data, base, base.positions, 40.0).tobytes()).hexdigest())
+"""
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env=os.environ | {"PYTHONHASHSEED": str(seed)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in range(1, 5)
+    }
+    assert len(found) == 1
