@@ -70,6 +70,7 @@ class Studio:
     def __init__(self) -> None:
         self._stack = ExitStack()
         self._wanted: tuple | None = None
+        self._staged = self._drawing = None
 
     def __enter__(self) -> Studio:
         return self
@@ -81,6 +82,7 @@ class Studio:
         """Take down the scene and free what OpenGL holds of it."""
         self._wanted = None
         self._stack.close()
+        self._staged = self._drawing = None  # before another is made
 
     def draw(self, task: Task, drawn: Callable[[Stimulus], None] = lambda _: None) -> None:
         """Draw those of the task's images that are not there yet; `drawn` is called after each."""
