@@ -20,7 +20,7 @@ import numpy as np
 from renderer.scene.lights import Light, PointLight
 
 MARGIN = 1e-3  # of a cosine: far above the rounding of a shader
-HORIZON = 0.08  # of passes/skin.frag: a lamp lights skin that turns away from it by so much more
+HORIZON = 0.08  # a lamp lights skin that turns away from it by so much more (passes/skin.frag)
 
 
 @dataclass(frozen=True)

@@ -458,8 +458,8 @@ void main() {
 #else
         float mirrors = lamp_facing(k, world, mirror);
 #endif
-        if (geometric > below - 0.08 && max(facing, mirrors) > 0.0) {
-            vec3 e = lamp_light(k, world) * visibility(k, world, smooth_n, phase) * smoothstep(below - 0.08, below + 0.12, geometric);
+        if (geometric > below - HORIZON && max(facing, mirrors) > 0.0) {
+            vec3 e = lamp_light(k, world) * visibility(k, world, smooth_n, phase) * smoothstep(below - HORIZON, below + 0.12, geometric);
             if (facing > 0.0) irradiance += e * facing * goes_in(n, v, l, m);
 #ifndef DIFFUSE_ONLY
             vec2 wide = sqrt(lobes * lobes + lamp_spread(k, world));

@@ -220,7 +220,7 @@ class Surfaces:
         """
         defines = {**lamps.defines(), **surroundings.defines(), "DOMAIN": domain}
         values = {**shared, **lamps.uniforms(), **surroundings.uniforms(), "face_table": self.face}
-        own = {**defines, "DIFFUSE": surface.DIFFUSE.index(diffuse)}
+        own = {**defines, "DIFFUSE": surface.DIFFUSE.index(diffuse), "HORIZON": facing.HORIZON}
         values["mean_radiance"] = surroundings.mean()
         values["even_light"] = float(light in ("all", "environment"))
         if light not in ("all", "lamps"):

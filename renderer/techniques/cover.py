@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-TILE = (
-    64  # pixels of a side, as software drivers cut a picture; even, so that derivatives are whole
-)
-ROUNDING_PX = (
-    8  # of a reach: half a pixel for each of a technique's passes, and one of a derivative
-)
+#: Pixels of a side, as software drivers cut a picture; even, so that derivatives are whole.
+TILE = 64
+#: Of a reach: half a pixel for each of a technique's passes, and one of a derivative.
+ROUNDING_PX = 8
 
 Window = tuple[int, int, int, int]  # x, y, width, height: px, y from below
 

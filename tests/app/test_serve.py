@@ -2,7 +2,6 @@
 killed.
 """
 
-import contextlib
 import os
 import re
 import resource
@@ -11,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import httpx
@@ -146,7 +145,7 @@ def test_a_worker_that_is_killed_is_replaced_and_none_outlives_the_server(study_
     server.kill()
     with pytest.raises(httpx.ConnectError):
         for _ in range(500):
-            with contextlib.suppress(httpx.ReadError):  # it ends while it is asked
+            with suppress(httpx.ReadError):  # it ends while it is asked
                 httpx.get(server.url, timeout=20)
             time.sleep(0.02)
 
