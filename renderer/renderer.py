@@ -17,7 +17,7 @@ from renderer.memory import give_back, give_back_large
 from renderer.optics.transmittance import Translucency
 from renderer.passes.environment import Surroundings
 from renderer.passes.hair import Hair
-from renderer.passes.lamps import LEAST_MM, Lamps
+from renderer.passes.lamps import LEAST_MM, Lamps, extremes
 from renderer.passes.lens import confusion
 from renderer.passes.points import Points
 from renderer.passes.surfaces import PLACED_FORMATS, Drawn, Surfaces
@@ -112,9 +112,9 @@ class Renderer:
         """Whether anything in the scene has strands."""
         return bool(self._contents.strands)
 
-    def _everything(self) -> np.ndarray:
-        """All points (N, 3) of the scene, mm."""
-        return np.vstack([self.surfaces.vertices(), *(hair.points for hair in self.hair)])
+    def _everything(self) -> list[np.ndarray]:
+        """All points of the scene, mm, in arrays (N, 3)."""
+        return [self.surfaces.vertices(), *(hair.points for hair in self.hair)]
 
     @cached_property
     def subject(self) -> np.ndarray:
@@ -122,22 +122,27 @@ class Renderer:
         own = getattr(self.scene, "subject", None)
         if own is not None:
             return np.asarray(own, float)
-        points = self._everything()
-        return 0.5 * (points.min(axis=0) + points.max(axis=0))
+        low, high = extremes(self._everything(), lambda points: points)
+        return 0.5 * (low + high)
 
     @cached_property
     def lamps(self) -> Lamps:
         """The lamps with their maps, which are drawn when they are first asked for, or read where
         they are kept: ask before a target is bound, by `light_up`.
         """
-        strands = np.vstack([np.empty((0, 3)), *(hair.casting(LEAST_MM) for hair in self.hair)])
-        lamps = Lamps(self._contents.lights, self._everything(), strands, self._shadow_map)
+        lamps = Lamps(
+            self._contents.lights,
+            self._everything(),
+            [hair.casting(LEAST_MM) for hair in self.hair],
+            self._shadow_map,
+        )
         keeps = "shadows" in self.keep
         if keeps and kept.load_shadows(self.kept_as, lamps, self.hair):
             return lamps
         lamps.draw(self.program, self.surfaces, self.hair)
         for hair in self.hair:
             hair.light(self.context, self.program, lamps, self.surroundings)
+            hair.rest()  # until surfaces are drawn
         if keeps:
             kept.keep_shadows(self.kept_as, lamps, self.hair)
         return lamps

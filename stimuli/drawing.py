@@ -79,10 +79,15 @@ class Studio:
         self.close()
 
     def close(self) -> None:
-        """Take down the scene and free what OpenGL holds of it."""
+        """Take down the scene, and give its memory back before another is made."""
         self._wanted = None
+        if self._staged is None:
+            return
+        from renderer.memory import give_back
+
         self._stack.close()
-        self._staged = self._drawing = None  # before another is made
+        self._staged = self._drawing = None
+        give_back()
 
     def draw(self, task: Task, drawn: Callable[[Stimulus], None] = lambda _: None) -> None:
         """Draw those of the task's images that are not there yet; `drawn` is called after each."""

@@ -331,14 +331,17 @@ def bake(
     lamps = tracer.lamps(points, normals)
     directions, hits = tracer.gather(points, normals, rays)
     # rays that start inside (folded lips, the back of the eyes) meet back faces: those send nothing
-    facing = tracer.mesh.face_normals[np.maximum(hits, 0)].astype(np.float32)
-    away = np.einsum("nri,nri->nr", directions, facing) > 0
-    blocked = np.where((hits >= 0) & away, len(faces), hits)
+    outwards = tracer.mesh.face_normals.astype(np.float32)
+    for first in range(0, len(points), CHUNK):
+        met = hits[first : first + CHUNK]
+        facing = outwards[np.maximum(met, 0)]
+        away = np.einsum("nri,nri->nr", directions[first : first + CHUNK], facing) > 0
+        met[(met >= 0) & away] = len(faces)
     irradiance = lamps
     for _ in range(BOUNCES + 1):
         sent = (albedo * irradiance / np.pi)[faces].mean(axis=1)
         sent = np.vstack([sent, np.zeros(3)])
-        baked = tracer.collect(normals, directions, blocked, sent)
+        baked = tracer.collect(normals, directions, hits, sent)
         irradiance = lamps + np.maximum(np.einsum("nci,ni->nc", baked.light, normals), 0)
     parts = []
     for k, body in enumerate(bodies):

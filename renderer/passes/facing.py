@@ -12,7 +12,7 @@ direction, as long as that is less than nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from renderer.scene.lights import Light, PointLight
 
 MARGIN = 1e-3  # of a cosine: far above the rounding of a shader
 HORIZON = 0.08  # a lamp lights skin that turns away from it by so much more (passes/skin.frag)
+AT_ONCE = 16384  # triangles
 
 
 @dataclass(frozen=True)
@@ -32,42 +33,31 @@ class Group:
 
 
 class Corners:
-    """A surface's triangles in the world.
+    """A surface's triangles in the world, gone through in parts: kept as corners they would take
+    ten times the mesh.
 
     positions, normals (N, 3): mm, unit length; faces (M, 3).
     """
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray, faces: np.ndarray):
-        self.faces = faces
-        self._at = positions[faces]
+        self.faces, self._positions = faces, positions
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        self._normals = (normals / np.maximum(lengths, 1e-12))[faces]
-        self._middle = self._at.mean(axis=1)
-        self._reach = np.linalg.norm(self._at - self._middle[:, None], axis=2).max(axis=1)
+        self._normals = normals / np.maximum(lengths, 1e-12)
 
-    def _towards(self, light: Light) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each triangle the cosines (M, 3) of its corners' normals with the way to a lamp, how
-        far they may be off (M,), and the sine of half of the lamp at most (M,).
-        """
-        if not isinstance(light, PointLight):
-            cosines = self._normals @ light.towards
-            tangent = np.tan(np.radians(light.radius_deg))
-            still = np.full(len(self.faces), MARGIN)
-            return cosines, still, np.full(len(self.faces), tangent / np.hypot(1.0, tangent))
-        to_lamp = light.place - self._middle
-        distance = np.linalg.norm(to_lamp, axis=1)
-        to_lamp /= np.maximum(distance, 1e-9)[:, None]
-        cosines = np.einsum("mci,mi->mc", self._normals, to_lamp)
-        nearest = np.maximum(distance - self._reach, 1e-9)
-        sine = light.radius_mm / np.hypot(light.radius_mm, nearest)
-        return cosines, MARGIN + 2.0 * self._reach / nearest, sine
+    def _parts(self) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """Of some triangles which they are, and their corners and their normals (K, 3, 3)."""
+        for start in range(0, len(self.faces), AT_ONCE):
+            part = slice(start, min(start + AT_ONCE, len(self.faces)))
+            faces = self.faces[part]
+            yield part, self._positions[faces], self._normals[faces]
 
     def lit(self, lights: Sequence[Light]) -> np.ndarray:
         """Whether each lamp can light each triangle from its front (lamps, M)."""
         can = np.empty((len(lights), len(self.faces)), bool)
-        for k, light in enumerate(lights):
-            cosines, off, sine = self._towards(light)
-            can[k] = cosines.max(axis=1) + off > -np.minimum(sine, 0.999) - HORIZON
+        for part, at, normals in self._parts():
+            for k, light in enumerate(lights):
+                cosines, off, sine = _towards(light, at, normals)
+                can[k, part] = cosines.max(axis=1) + off > -np.minimum(sine, 0.999) - HORIZON
         return can
 
     def lit_through(self, lights: Sequence[Light], wrap: float) -> np.ndarray:
@@ -75,19 +65,45 @@ class Corners:
         cosine, see `renderer.optics.transmittance.Translucency`.
         """
         can = np.empty((len(lights), len(self.faces)), bool)
-        for k, light in enumerate(lights):
-            cosines, off, _ = self._towards(light)
-            can[k] = light.shadow & (cosines.min(axis=1) - off < max(wrap, 0.0))
+        for part, at, normals in self._parts():
+            for k, light in enumerate(lights):
+                cosines, off, _ = _towards(light, at, normals)
+                can[k, part] = light.shadow & (cosines.min(axis=1) - off < max(wrap, 0.0))
         return can
 
     def behind(self, eye: np.ndarray) -> np.ndarray:
         """Which triangles show their back to an eye at (3,) mm, whose normals shaders may turn
         (M,).
         """
-        across = np.cross(self._at[:, 1] - self._at[:, 0], self._at[:, 2] - self._at[:, 0])
-        towards = np.einsum("mi,mi->m", across, eye - self._at[:, 0])
-        scale = np.linalg.norm(across, axis=1) * np.linalg.norm(eye - self._at[:, 0], axis=1)
-        return towards <= MARGIN * scale
+        backs = np.empty(len(self.faces), bool)
+        for part, at, _ in self._parts():
+            across = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
+            towards = np.einsum("mi,mi->m", across, eye - at[:, 0])
+            scale = np.linalg.norm(across, axis=1) * np.linalg.norm(eye - at[:, 0], axis=1)
+            backs[part] = towards <= MARGIN * scale
+        return backs
+
+
+def _towards(
+    light: Light, at: np.ndarray, normals: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of triangles with corners and normals (M, 3, 3) the cosines (M, 3) of their normals with the
+    way to a lamp, how far they may be off (M,), and the sine of half of the lamp at most (M,).
+    """
+    if not isinstance(light, PointLight):
+        cosines = normals @ light.towards
+        tangent = np.tan(np.radians(light.radius_deg))
+        still = np.full(len(at), MARGIN)
+        return cosines, still, np.full(len(at), tangent / np.hypot(1.0, tangent))
+    middle = at.mean(axis=1)
+    reach = np.linalg.norm(at - middle[:, None], axis=2).max(axis=1)
+    to_lamp = light.place - middle
+    distance = np.linalg.norm(to_lamp, axis=1)
+    to_lamp /= np.maximum(distance, 1e-9)[:, None]
+    cosines = np.einsum("mci,mi->mc", normals, to_lamp)
+    nearest = np.maximum(distance - reach, 1e-9)
+    sine = light.radius_mm / np.hypot(light.radius_mm, nearest)
+    return cosines, MARGIN + 2.0 * reach / nearest, sine
 
 
 def groups(faces: np.ndarray, can: np.ndarray) -> list[Group]:

@@ -7,7 +7,7 @@ the depth of the first strand, and the opacity summed to some distances behind i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -27,6 +27,9 @@ MANY = 20000  # strands: of so many, half stand for all in a lamp's map
 COLUMNS = 2048  # texels of a row of points
 SEGMENTS = 4  # of a piece: what is left out or sorted as one
 CHUNK = 32768  # pieces that are put on the graphics card at a time
+ROWS = 64  # of points that are reckoned and put there at a time
+#: What `Hair.fixed` makes.
+FIXED = ("places", "tangents", "covers", "colours", "environments")
 
 
 class Hair:
@@ -35,26 +38,37 @@ class Hair:
     def __init__(self, item: Item, on: Drawn):
         self.strands, pose = item.primitive.strands, item.pose
         first = self.strands.first
-        self.points = (self.strands.points @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32)
+        self.points = np.asarray(self.strands.points, np.float32)
+        if not np.array_equal(pose, np.eye(4)):  # else they are the scene's own
+            self.points = np.empty(self.points.shape, np.float32)
+            for part in bands(len(self.points)):
+                self.points[part] = item.in_world(self.strands.points[part])
         self.size = float(np.linalg.norm(pose[:3, 0]))
         self.counts = np.diff(first)
-        self.of = np.repeat(np.arange(len(self.counts)), self.counts)  # strand of each point
+        of = np.arange(len(self.counts), dtype=np.int32)
+        self.of = np.repeat(of, self.counts)  # strand of each point
         root = self.strands.root_vertex
         turned = on.item.primitive.normals[root] @ pose[:3, :3].T / self.size
         self.normals = turned.astype(np.float32)
         light = on.baked.light[root]
         self.environment = np.maximum(np.einsum("nci,ni->nc", light, self.normals), 0)
-        self.tangents = tangents(self.points, first)
         self.pieces = pieces(first)
         self.rows = -(-len(self.points) // COLUMNS)
         self._fixed: dict[str, gl.Texture] = {}
         self._lit: gl.TextureArray | None = None
 
-    def _per_point(self, xyz: np.ndarray, w: np.ndarray | float) -> gl.Texture:
-        data = np.zeros((self.rows * COLUMNS, 4), np.float32)
-        data[: len(self.points), :3], data[: len(self.points), 3] = xyz, w
-        shape = (self.rows, COLUMNS, 4)
-        return gl.Texture(COLUMNS, self.rows, GL.GL_RGBA32F, data=data.reshape(shape))
+    def _per_point(self, values: Callable[[slice, np.ndarray], tuple]) -> gl.Texture:
+        """A texture of `values`, which makes xyz (K, 3) and w (K,) of some points from their place
+        and their strands.
+        """
+        texture = gl.Texture(COLUMNS, self.rows, GL.GL_RGBA32F)
+        for part in bands(self.rows * COLUMNS):
+            texels = np.zeros((part.stop - part.start, 4), np.float32)
+            own = slice(part.start, min(part.stop, len(self.points)))
+            count = own.stop - own.start
+            texels[:count, :3], texels[:count, 3] = values(own, self.of[own])
+            texture.write_rows(part.start // COLUMNS, texels.reshape(-1, COLUMNS, 4))
+        return texture
 
     def _per_strand(self, xyz: np.ndarray, w: np.ndarray | float) -> gl.Texture:
         rows = -(-len(self.counts) // COLUMNS)
@@ -62,25 +76,41 @@ class Hair:
         data[: len(self.counts), :3], data[: len(self.counts), 3] = xyz, w
         return gl.Texture(COLUMNS, rows, GL.GL_RGBA32F, data=data.reshape(rows, COLUMNS, 4))
 
-    def fixed(self) -> dict[str, gl.Texture]:
-        """What no view changes, on the graphics card: of points and of strands."""
-        if not self._fixed:
-            strands = self.strands
-            width = self.size * strands.width_mm
-            last = self.counts[self.of] - 1
-            along = (np.arange(len(self.points)) - strands.first[:-1][self.of]) / last
-            tapered = width[self.of] * (1 + (strands.tip[self.of] - 1) * along**3)
-            self._fixed = {
-                "places": self._per_point(self.points, tapered),
-                "tangents": self._per_point(self.tangents, self.of),
-                "covers": self._per_point(self.normals[self.of], strands.cover),
-                "colours": self._per_strand(strands.colour, strands.sheen),
-                "environments": self._per_strand(self.environment, strands.first[:-1]),
-            }
-        return self._fixed
+    def fixed(self, *names: str) -> dict[str, gl.Texture]:
+        """What no view changes, on the graphics card: of points and of strands. names: of FIXED,
+        which is what is made; none: all.
+        """
+        for name in names or FIXED:
+            if name not in self._fixed:
+                self._fixed[name] = getattr(self, f"_{name}")()
+        return {name: self._fixed[name] for name in names or FIXED}
+
+    def _places(self) -> gl.Texture:
+        strands, width = self.strands, self.size * self.strands.width_mm
+
+        def values(part: slice, of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            along = (np.arange(part.start, part.stop) - strands.first[of]) / (self.counts[of] - 1)
+            return self.points[part], width[of] * (1 + (strands.tip[of] - 1) * along**3)
+
+        return self._per_point(values)
+
+    def _tangents(self) -> gl.Texture:
+        first = self.strands.first
+        return self._per_point(lambda part, of: (tangents(self.points, first, part, of), of))
+
+    def _covers(self) -> gl.Texture:
+        return self._per_point(lambda part, of: (self.normals[of], self.strands.cover[part]))
+
+    def _colours(self) -> gl.Texture:
+        return self._per_strand(self.strands.colour, self.strands.sheen)
+
+    def _environments(self) -> gl.Texture:
+        return self._per_strand(self.environment, self.strands.first[:-1])
 
     def rest(self) -> None:
-        """Free what `fixed` has put on the graphics card, 60 MB a head: it is made anew at need."""
+        """Free what `fixed` has put on the graphics card, 50 bytes a point: it is made anew at
+        need.
+        """
         for texture in self._fixed.values():
             texture.delete()
         self._fixed = {}
@@ -96,23 +126,21 @@ class Hair:
 
         Kept as (optical depth of the strands before it, share that surfaces let past).
         """
-        root = self.points[self.strands.first[:-1]][self.of]
-        away = np.linalg.norm(self.points - root, axis=1) / (FREE_MM * self.size)
-        lift = self._per_point(self.normals[self.of], np.exp(-away))
-        values = {
-            **lamps.uniforms(),
-            **surroundings.uniforms(),
-            "places": self.fixed()["places"],
-            "tangents": self.fixed()["tangents"],
-            "normals": lift,
-        }
+        roots, free_mm = self.points[self.strands.first[:-1]], FREE_MM * self.size
+
+        def lifted(part: slice, of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            away = np.linalg.norm(self.points[part] - roots[of], axis=1) / free_mm
+            return self.normals[of], np.exp(-away)
+
+        fixed, lift = self.fixed("places", "tangents"), self._per_point(lifted)
+        values = {**lamps.uniforms(), **surroundings.uniforms(), **fixed, "normals": lift}
         program = programs("passes/hair_lit.frag", {**lamps.defines(), **surroundings.defines()})
         count = max(1, len(lamps.lights))
         self._lit = gl.TextureArray(COLUMNS, self.rows, count, GL.GL_RG16F)
         smooth = programs("passes/hair_smooth.frag")
         size, formats = (COLUMNS, self.rows), [GL.GL_RG16F]
         with gl.Target(*size, formats) as raw, gl.Target(*size, formats) as target:
-            along = {"raw": raw.textures[0], "tangents": self.fixed()["tangents"]}
+            along = {"raw": raw.textures[0], "tangents": fixed["tangents"]}
             for k in range(len(lamps.lights)):
                 raw.bind()
                 program.use(**program.accepts({**values, "lamp": k}))
@@ -136,14 +164,15 @@ class Hair:
 
     def casting(self, least_mm: float) -> np.ndarray:
         """Points (M, 3) of the strands that are at least so wide."""
-        return self.points[(self.size * self.strands.width_mm >= least_mm)[self.of]]
+        wide = self.size * self.strands.width_mm >= least_mm
+        return self.points[np.repeat(wide, self.counts)]
 
     def draw_shadows(self, program: gl.Program, values: dict, least_mm: float) -> None:
         """Ribbons that face a lamp; strands thinner than least_mm cast no shadow.
 
         values: what passes/hair.vert takes for a lamp, and its fragment shader.
         """
-        fixed = self.fixed()
+        fixed = self.fixed("places", "tangents")
         casts = self.size * self.strands.width_mm >= least_mm
         # of the scalp's hair every second strand stands for two
         many = (self.counts > LONG_POINTS) & (len(self.counts) > MANY)
@@ -241,11 +270,18 @@ def _draw_and_free(chosen: np.ndarray) -> None:
     mesh.delete()
 
 
-def tangents(points: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Unit tangents (N, 3) of polylines with points (N, 3) that begin at first[:-1]."""
-    before, after = np.arange(len(points)) - 1, np.arange(len(points)) + 1
-    before[first[:-1]] += 1
-    after[first[1:] - 1] -= 1
+def bands(count: int) -> Iterator[slice]:
+    """`count` points, ROWS rows of them at a time."""
+    for start in range(0, count, ROWS * COLUMNS):
+        yield slice(start, min(start + ROWS * COLUMNS, count))
+
+
+def tangents(points: np.ndarray, first: np.ndarray, part: slice, of: np.ndarray) -> np.ndarray:
+    """Unit tangents (K, 3) at some of the points (N, 3) of polylines that begin at first[:-1]. of
+    (K,): the polylines of these.
+    """
+    here = np.arange(part.start, part.stop)
+    before, after = np.maximum(here - 1, first[of]), np.minimum(here + 1, first[of + 1] - 1)
     tangent = points[after] - points[before]
     return tangent / np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-6)
 
@@ -260,7 +296,10 @@ def pieces(first: np.ndarray) -> np.ndarray:
     number = np.arange(len(of)) - np.repeat(np.cumsum(runs) - runs, runs)
     start = first[:-1][of] + SEGMENTS * number
     ends = first[1:][of] - 1
-    return np.minimum(start[:, None] + np.arange(SEGMENTS + 1), ends[:, None]).astype(np.uint32)
+    cut = np.empty((len(of), SEGMENTS + 1), np.uint32)
+    for k in range(SEGMENTS + 1):
+        cut[:, k] = np.minimum(start + k, ends)
+    return cut
 
 
 def ribbon_faces(chosen: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,7 @@ PER_LAMP = (
     "strand_layer",
     "strand_faces",
 )
+AT_ONCE = 65536  # points that are turned at a time
 _CUBE = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
 
 
@@ -47,11 +48,34 @@ class Layer:
     farthest_mm: float
 
 
-def distant_layer(light: DistantLight, points: np.ndarray) -> Layer:
-    """A box around points (N, 3), seen along the light; depth from its nearest point."""
+#: Points (N, 3), mm, in as many arrays as there are.
+Clouds = Sequence[np.ndarray]
+
+
+def extremes(clouds: Clouds, of: Callable[[np.ndarray], np.ndarray]) -> tuple:
+    """The least and the most of what `of` makes of points (K, 3), over all of them.
+
+    They are gone through in parts: hair has some millions.
+    """
+    least, most = [], []
+    for part in _parts(clouds):
+        made = of(part)
+        least.append(made.min(axis=0))
+        most.append(made.max(axis=0))
+    return np.min(least, axis=0), np.max(most, axis=0)
+
+
+def _parts(clouds: Clouds) -> Iterator[np.ndarray]:
+    for cloud in clouds:
+        for start in range(0, len(cloud), AT_ONCE):
+            yield np.asarray(cloud[start : start + AT_ONCE], float)
+
+
+def distant_layer(light: DistantLight, clouds: Clouds) -> Layer:
+    """A box around all points, seen along the light; depth from its nearest point."""
     turn = look_at(light.towards, np.zeros(3))[:3, :3]
-    local = points @ turn
-    low, high = local.min(axis=0) - MARGIN_MM, local.max(axis=0) + MARGIN_MM
+    low, high = extremes(clouds, lambda points: points @ turn)
+    low, high = low - MARGIN_MM, high + MARGIN_MM
     half = 0.5 * (high - low)[:2].max()
     centre = 0.5 * (low + high)
     matrix = np.eye(4)
@@ -61,68 +85,70 @@ def distant_layer(light: DistantLight, points: np.ndarray) -> Layer:
     return Layer(matrix, 0.5 / half, float(high[2] - low[2]))
 
 
-def cone_layer(place: np.ndarray, axis: np.ndarray, half_deg: float, points: np.ndarray) -> Layer:
+def cone_layer(place: np.ndarray, axis: np.ndarray, half_deg: float, clouds: Clouds) -> Layer:
     """A cone of a half angle (of the square map) from a place along a unit axis."""
     pose = look_at(np.zeros(3), axis)
     turn = pose[:3, :3]
-    away = (points - place) @ -turn[:, 2]
+    _, farthest = extremes(clouds, lambda points: (points - place) @ -turn[:, 2])
     cotangent = 1 / np.tan(np.radians(half_deg))
     matrix = np.zeros((4, 4))
     matrix[0, :3], matrix[1, :3] = cotangent * turn[:, 0], cotangent * turn[:, 1]
     matrix[2, :3] = matrix[3, :3] = -turn[:, 2]
     matrix[:, 3] = -matrix[:, :3] @ place
-    return Layer(matrix, 0.5 * cotangent, float(max(away.max(), NEAREST_MM)) + MARGIN_MM)
+    return Layer(matrix, 0.5 * cotangent, float(max(farthest, NEAREST_MM)) + MARGIN_MM)
 
 
-def layers_of(light: Light, points: np.ndarray) -> list[Layer]:
-    """The layers of a lamp over all points (N, 3) of the scene: none without shadow.
+def layers_of(light: Light, clouds: Clouds) -> list[Layer]:
+    """The layers of a lamp over all points of the scene: none without shadow.
 
     A point lamp outside of the scene sees it in one cone, one among the objects in a cube of six.
     """
     if not light.shadow:
         return []
     if isinstance(light, DistantLight):
-        return [distant_layer(light, points)]
+        return [distant_layer(light, clouds)]
     assert isinstance(light, PointLight)
     if isinstance(light, SpotLight) and light.outer_deg < 75:
-        return [cone_layer(light.place, light.along, light.outer_deg + 1.0, points)]
-    low, high = points.min(axis=0), points.max(axis=0)
-    centre = 0.5 * (low + high)
-    away = points - light.place
-    distance = np.linalg.norm(away, axis=1)
-    axis = centre - light.place
+        return [cone_layer(light.place, light.along, light.outer_deg + 1.0, clouds)]
+    low, high = extremes(clouds, lambda points: points)
+    nearest, _ = extremes(clouds, lambda points: np.linalg.norm(points - light.place, axis=1))
+    axis = 0.5 * (low + high) - light.place
     length = np.linalg.norm(axis)
-    outside = length > 0 and distance.min() > NEAREST_MM
-    if outside:
+    if length > 0 and nearest > NEAREST_MM:
         axis = axis / length
-        cosine = ((away / distance[:, None]) @ axis).min()
+
+        def off_axis(points: np.ndarray) -> np.ndarray:
+            away = points - light.place
+            return (away / np.linalg.norm(away, axis=1)[:, None]) @ axis
+
+        cosine, _ = extremes(clouds, off_axis)
         if cosine > np.cos(np.radians(65)):
             half = float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))) + 1.0
-            return [cone_layer(light.place, axis, half, points)]
-    return [cone_layer(light.place, np.array(side, float), 45.0, points) for side in _CUBE]
+            return [cone_layer(light.place, axis, half, clouds)]
+    return [cone_layer(light.place, np.array(side, float), 45.0, clouds) for side in _CUBE]
 
 
 class Lamps:
     """The lamps of a scene with their maps; `uniforms` gives what lighting.glsl takes.
 
-    map_size: pixels of a map's side; points (N, 3): all surfaces, mm; strands (M, 3): all points of
-    hair that casts shadows.
+    map_size: pixels of a map's side; clouds: points (N, 3) of all that is there, mm; strands:
+    those of hair that casts shadows.
     """
 
-    def __init__(
-        self, lights: Sequence[Light], points: np.ndarray, strands: np.ndarray, map_size: int
-    ):
+    def __init__(self, lights: Sequence[Light], clouds: Clouds, strands: Clouds, map_size: int):
         self.lights = list(lights)
         self.layers: list[Layer] = []
         self.first: list[int] = []
         self.faces: list[int] = []
         for light in self.lights:
-            layers = layers_of(light, points)
+            layers = layers_of(light, clouds)
             self.first.append(len(self.layers) if layers else -1)
             self.faces.append(len(layers))
             self.layers += layers
         # hair has maps of its own, no wider than it is
-        near = [layers_of(light, strands) if len(strands) else [] for light in self.lights]
+        near = [
+            layers_of(light, strands) if any(map(len, strands)) else [] for light in self.lights
+        ]
         self.strand_first = [sum(map(len, near[:k])) if own else -1 for k, own in enumerate(near)]
         self.strand_faces = [len(own) for own in near]
         self.strand_layers = [layer for own in near for layer in own]

@@ -62,10 +62,18 @@ class StrandPrimitive(pyrender.Primitive):
     """Hair: its points as lines; the strands stand on the surface of the same mesh."""
 
     def __init__(self, strands: Strands):
-        start = np.delete(np.arange(len(strands.points)), strands.first[1:] - 1)
-        lines = np.stack([start, start + 1], axis=1)
-        super().__init__(strands.points, indices=lines, mode=1)
         self.strands = strands
+        super().__init__(strands.points, mode=1)
+
+    @property
+    def indices(self) -> np.ndarray:
+        """The lines (L, 2), made when pyrender asks for them to draw them itself."""
+        start = np.delete(np.arange(len(self.strands.points)), self.strands.first[1:] - 1)
+        return np.stack([start, start + 1], axis=1)
+
+    @indices.setter
+    def indices(self, given: None) -> None:
+        """pyrender says that there are none."""
 
 
 class DistantLamp(pyrender.DirectionalLight):

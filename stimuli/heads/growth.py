@@ -4,6 +4,7 @@ kept out of the head.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,13 @@ DENSITY_MM = 3.0  # cells of the density of hair
 LOOK_MM = (1.5, 3.0, 5.0, 8.0, 13.0)  # where it is looked up outwards of a point
 COMB_MM = 8.0  # cells of the direction of the comb
 BLEND_MM = 14.0  # anchors' values are level so near to them
+STRANDS, POINTS = 4096, 65536  # reckoned with at once: 100,000 long strands are 72 MB an array
+
+
+def parts(count: int, at_once: int = STRANDS) -> Iterator[slice]:
+    """`count` strands or points, some at once."""
+    for start in range(0, count, at_once):
+        yield slice(start, min(start + at_once, count))
 
 
 class Grid:
@@ -31,14 +39,13 @@ class Grid:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(N, C) at points (N, 3); outside, the values of the nearest edge."""
-        where = ((points - self.low) / self.spacing).T
-        return np.stack(
-            [
-                map_coordinates(self.values[..., c], where, order=1, mode="nearest")
-                for c in range(self.values.shape[-1])
-            ],
-            axis=1,
-        )
+        found = np.empty((len(points), self.values.shape[-1]))
+        for part in parts(len(points), POINTS):
+            where = ((points[part] - self.low) / self.spacing).T
+            for c in range(self.values.shape[-1]):
+                at = map_coordinates(self.values[..., c], where, order=1, mode="nearest")
+                found[part, c] = at
+        return found
 
 
 def _cells(low: np.ndarray, spacing: float, counts: np.ndarray) -> np.ndarray:
@@ -161,7 +168,8 @@ def grow(
     flow = _unit(flow - normals * (flow * normals).sum(axis=1, keepdims=True))
     way = np.cos(lift)[:, None] * flow + np.sin(lift)[:, None] * normals
     step = length / (points - 1)
-    path, left_side = [roots], (side < 0)[:, None]
+    path, left_side = np.empty((len(roots), points, 3)), (side < 0)[:, None]
+    path[:, 0] = roots
     fields = combs(style, eyes, skin.low, skin.low + skin.spacing * np.array(skin.values.shape[:3]))
     p, tied = roots, np.zeros(len(roots))
     keep = 1 - np.exp(-step / style.stiff_mm)
@@ -187,8 +195,8 @@ def grow(
         inside = skin.at(p)
         low = CLEAR_MM + np.minimum(0.35 * height, 0.1 * gone)
         p = p + np.maximum(low - inside[:, 0], 0)[:, None] * inside[:, 1:]
-        path.append(p)
-    return np.stack(path, axis=1)
+        path[:, k] = p
+    return path
 
 
 def gather(curves, roots, leader: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -214,15 +222,20 @@ def covered(curves: np.ndarray, width: np.ndarray, out: np.ndarray) -> np.ndarra
     flat = curves.reshape(-1, 3)
     low = flat.min(axis=0) - 8 * DENSITY_MM
     shape = np.ceil((flat.max(axis=0) + 8 * DENSITY_MM - low) / DENSITY_MM).astype(int) + 1
-    piece = np.linalg.norm(np.diff(curves, axis=1), axis=2).mean(axis=1) * width
-    weight = np.repeat(piece, curves.shape[1])
-    cell = np.round((flat - low) / DENSITY_MM).astype(int)
-    index = np.ravel_multi_index(cell.T, shape)
+    piece, index = np.empty(len(curves)), np.empty(len(flat), int)
+    for part in parts(len(curves)):
+        piece[part] = np.linalg.norm(np.diff(curves[part], axis=1), axis=2).mean(axis=1)
+    weight = np.repeat(piece * width, curves.shape[1])
+    for part in parts(len(flat), POINTS):
+        cell = np.round((flat[part] - low) / DENSITY_MM).astype(int)
+        index[part] = np.ravel_multi_index(cell.T, shape)
     amount = np.bincount(index, weight, minlength=int(np.prod(shape))).reshape(shape)
     amount = gaussian_filter(amount / DENSITY_MM**3, 0.8)[..., None]
-    field, depth, before = Grid(low, DENSITY_MM, amount), np.zeros(len(flat)), 0.0
-    for look in LOOK_MM:
-        depth += field.at(flat + look * out)[:, 0] * (look - before)
-        before = look
+    field, depth = Grid(low, DENSITY_MM, amount), np.zeros(len(flat))
+    for part in parts(len(flat), POINTS):
+        before = 0.0
+        for look in LOOK_MM:
+            depth[part] += field.at(flat[part] + look * out[part])[:, 0] * (look - before)
+            before = look
     # (2 / pi): the mean share of its length that a strand shows a direction
     return (1 - np.exp(-depth * 2 / np.pi)).reshape(curves.shape[:2])

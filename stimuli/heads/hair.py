@@ -258,13 +258,18 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
     led = growth.gather(led, p[tufts], first_of, drawn)
     share_of = style.gather_tufts * apiece[:, None, None] * (s**0.8)[None, :, None]
     loose = np.where(fly, 0.25, 1.0)[:, None, None]
-    apart = (p - p[tufts][own_tuft])[:, None] * (1 - 0.7 * s)[None, :, None]
-    curves += loose * share_of * (led[own_tuft] + apart - curves)
+    for part in growth.parts(count):
+        leader, some = own_tuft[part], curves[part]
+        apart = (p[part] - p[tufts][leader])[:, None] * (1 - 0.7 * s)[None, :, None]
+        some += loose[part] * share_of[part] * (led[leader] + apart - some)
     curves = _waved(curves, style, length, draw, rng, skin)
     curves, at = _out_of_the_head(curves, skin, 4)
     if length.max() > LONG_MM:  # what met the body has corners
-        for _ in range(3):
-            curves[:, 2:-1] += 0.25 * (curves[:, 1:-2] - 2 * curves[:, 2:-1] + curves[:, 3:])
+        del at
+        for part in growth.parts(count):
+            some = curves[part]
+            for _ in range(3):
+                some[:, 2:-1] += 0.25 * (some[:, 1:-2] - 2 * some[:, 2:-1] + some[:, 3:])
         curves, at = _out_of_the_head(curves, skin, 2)
     curves[:, 0] = p
     width = own.width_mm * np.clip(1 + own.width_uneven * rng.normal(size=count), 0.4, 1.6)
@@ -273,6 +278,7 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
     tone = own.lightness * draw(0.35, 0.45, 0.8)
     colours = pigmented(own, tone, rng.random(count), own.grey)
     cover = growth.covered(curves, width / share, at[:, 1:])
+    del at
     tip = np.full(count, 0.8 if length.mean() < 15 else 0.5)
     kept = ~alone_before_the_face(curves, eyes, share)
     whole_lot = {**_pack(curves, width, colours, cover, roots.vertex), "tip": tip}
@@ -316,15 +322,9 @@ def alone_before_the_face(curves: np.ndarray, eyes: np.ndarray, share: float) ->
 
 
 def _waved(curves, style: Style, length, draw, rng, skin) -> np.ndarray:
-    """Waves across the strands, coils, and each strand's own wandering."""
+    """Waves across the strands, coils, and each strand's own wandering, added to curves."""
     count, points = curves.shape[:2]
     s = np.linspace(0, 1, points)
-    along = np.gradient(curves, axis=1)
-    along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
-    out = skin.at(curves.reshape(-1, 3))[:, 1:].reshape(curves.shape)
-    across = np.cross(along, out)
-    across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
-    off = np.cross(across, along)
     phase = 2 * np.pi * length[:, None] * s / style.wave_length_mm
     phase = phase * (1 + 0.12 * draw(0.4, 0.6, 0.5))[:, None] + draw(3.0, 1.0, 0.35)[:, None]
     size = style.wave_mm * np.clip(1 + 0.3 * draw(0.5, 0.6, 0.5), 0.2, 2.0)
@@ -332,10 +332,19 @@ def _waved(curves, style: Style, length, draw, rng, skin) -> np.ndarray:
     size = size[:, None] * np.minimum(s * length[:, None] / (0.5 * style.wave_length_mm), 1.0)
     swing = size * (np.cos(phase) - np.cos(phase[:, :1]))
     coil = style.coil * size * (np.sin(phase) - np.sin(phase[:, :1]))
-    own = style.frizz_mm * s[:, None] * rng.normal(size=(count, 1, 3))
-    turn = rng.uniform(0, 2 * np.pi, (count, 1, 3)) + 5.0 * s[None, :, None]
-    own = own * (0.6 + np.sin(turn))
-    return curves + swing[..., None] * across + coil[..., None] * off + own
+    wander, turn = rng.normal(size=(count, 1, 3)), rng.uniform(0, 2 * np.pi, (count, 1, 3))
+    for part in growth.parts(count):
+        some = curves[part]
+        along = np.gradient(some, axis=1)
+        along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
+        out = skin.at(some.reshape(-1, 3))[:, 1:].reshape(some.shape)
+        across = np.cross(along, out)
+        across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
+        off = np.cross(across, along)
+        own = style.frizz_mm * s[:, None] * wander[part]
+        own = own * (0.6 + np.sin(turn[part] + 5.0 * s[None, :, None]))
+        curves[part] = some + swing[part, :, None] * across + coil[part, :, None] * off + own
+    return curves
 
 
 class Projector:
@@ -522,7 +531,10 @@ def joined(parts: list[dict], own: Hair) -> Strands:
         **{key: [p[key] for p in parts] for key in ("width_mm", "colour")},
     }
     return Strands(
-        **{key: np.concatenate(each).astype(np.float32) for key, each in flat.items()},
+        **{
+            key: np.concatenate(each, dtype=np.float32, casting="same_kind")
+            for key, each in flat.items()
+        },
         first=np.concatenate([[0], np.cumsum(counts)]),
         root_vertex=np.concatenate([p["root_vertex"] for p in parts]).astype(np.int64),
         leaves_mm=own.leaves_mm,

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from renderer.memory import give_back_large
 from renderer.scene import (
     MASKS,
     Material,
@@ -28,6 +29,7 @@ GENERATED = {"what": "generated shape", "licence": "MIT", "source": "subdermal"}
 
 def stage(scene: Scene, seed: int) -> Stage:
     """See stimuli.scenes.stage."""
+    give_back_large()  # the making of a person frees some hundred megabytes
     made = {name: _model(thing, scene, seed) for name, thing in scene.objects.items()}
     subject = _subject(made[scene.subject][0], scene.objects[scene.subject].pose())
     graph = SceneGraph(scene.environment, scene.picture, subject, scene.camera)

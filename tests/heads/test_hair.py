@@ -1,5 +1,7 @@
 """Generated hair: styles as data, lengths, and strands that stay out of the head."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import trimesh
@@ -193,3 +195,35 @@ def test_brows_differ_fade_at_the_tail_and_follow_what_is_said():
         u = (left["points"][:, 0, 0] - 32.0 - own.brow_inner_mm) / own.brow_length_mm
         ends.append((u > 0.9).mean() / (np.abs(u - 0.4) < 0.05).mean())
     assert ends[0] < 0.15 and ends[1] == pytest.approx(1.0, abs=0.25)
+
+
+def test_long_strands_are_waved_and_covered_some_at_a_time(monkeypatch):
+    """In at most a few times what they take themselves, and as if all were at once."""
+    count, points = 24_000, 20
+    rng = np.random.default_rng(4)
+    start = rng.uniform(-60, 60, (count, 1, 3))
+    curves = start + np.linspace(0, 200, points)[:, None] * [0.0, -0.9, 0.4]
+    low, high = curves.min(axis=(0, 1)) - 10, curves.max(axis=(0, 1)) + 10
+    shape = np.ceil((high - low) / 20).astype(int) + 1
+    skin = growth.Grid(low, 20.0, rng.random((*shape, 4)))
+    style, length = Style.read("long", "style"), rng.uniform(100, 200, count)
+
+    out = np.broadcast_to([0.0, 0.0, 1.0], (count * points, 3))
+
+    def made():
+        drawn = np.random.default_rng(2)
+        draw = lambda a, b, c, *shape: drawn.normal(size=(count, *shape))
+        waved = hair._waved(curves.copy(), style, length, draw, drawn, skin)
+        return waved, growth.covered(waved, np.full(count, 0.07), out)
+
+    tracemalloc.start()
+    try:
+        waved, cover = made()
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 5 * curves.nbytes
+    assert np.abs(waved - curves).max() > 1.0 and 0 < cover.max() <= 1
+    monkeypatch.setattr(growth, "parts", lambda whole, *_: [slice(0, whole)])
+    for some, all_at_once in zip((waved, cover), made(), strict=True):
+        np.testing.assert_array_equal(some, all_at_once)

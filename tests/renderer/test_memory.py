@@ -1,13 +1,22 @@
-"""Memory: an image is filtered in pieces that give the bytes of the whole; nothing is kept."""
+"""Memory: an image is filtered in pieces that give the bytes of the whole, hair and triangles are
+gone through in parts; nothing is kept.
+"""
+
+import tracemalloc
 
 import numpy as np
 import pytest
 
 import renderer
 from renderer.optics.transmittance import Translucency
+from renderer.passes import facing
 from renderer.passes import pieces as cutting
 from renderer.passes.pieces import PIECE_PIXELS, Piece, pieces
+from renderer.scene import shapes
+from renderer.scene.camera import Camera
+from renderer.scene.lights import DistantLight
 from tests.renderer.slab import frame_of_ball
+from tests.renderer.test_hair import stand_of
 
 #: Bytes a pixel: irradiance 16, specular, albedo and, once it is asked for, transmitted light 8
 #: each, depths and depth buffer 4 + 4; of a piece, light 16, depth 4, result 20, and two targets of
@@ -93,3 +102,52 @@ def test_techniques_over_surfaces_keep_nothing(name, techniques, small_ball):
         context.make_current()
         held.append(context.held)
     assert held[0] == held[1]
+
+
+@pytest.fixture
+def traced():
+    """traced() -> bytes of arrays that are held, and the most that were since the last call."""
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+
+    def since():
+        held, most = (value - before for value in tracemalloc.get_traced_memory())
+        tracemalloc.reset_peak()
+        return held, most
+
+    yield since
+    tracemalloc.stop()
+
+
+def test_hair_takes_little_more_than_its_points(traced):
+    """Bytes a point: 12 are its place, which the scene has; textures are made some rows at a time.
+
+    A head of long hair has 3 million points, and 100 bytes more for each were 300 MB.
+    """
+    strands, points = 20_000, 20
+    rng = np.random.default_rng(0)
+    at = np.empty((strands, points, 3), np.float32)
+    at[..., :2] = rng.uniform(-60, 60, (strands, 1, 2))
+    at[..., 2] = np.linspace(0, 30, points)
+    graph, count = stand_of(at, 0.07), strands * points
+    before = traced()[0]
+    with renderer.Renderer(graph, (32, 32), 1, rays=4, shadow_map=64) as drawing:
+        (hair,) = drawing.hair
+        held, most = traced()
+        assert len(hair.points) == count and drawing.lamps.strand_layers
+        assert held - before < 20 * count and most - before < 60 * count
+        with drawing.frame(Camera(height_mm=200.0)) as frame:
+            assert frame.surface.textures[1].read()[..., 3].max() > 0, "hair is seen"
+        assert traced()[1] - before < 70 * count
+
+
+def test_triangles_are_sorted_by_their_lamps_without_being_kept_as_corners(traced):
+    """Bytes a triangle; nine corners' numbers and as many of normals were 144 for each."""
+    ball = shapes.sphere(50.0, rings=200)
+    count, before = len(ball.faces), traced()[0]
+    corners = facing.Corners(ball.positions, ball.normals, ball.faces)
+    can = corners.lit([DistantLight(), DistantLight(direction=(0.0, 0.0, -1.0))])
+    can |= corners.behind(np.array([0.0, 0.0, 1e4]))
+    held, most = traced()
+    assert can[0].mean() > 0.4 and can.all(axis=0).any()
+    assert held - before < 40 * count and most - before < 100 * count
