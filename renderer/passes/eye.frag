@@ -108,7 +108,7 @@ void main() {
     vec3 shade = pow(vec3((1.0 - under) * (1.0 - over) * (1.0 - corner) * (1.0 - sides) * (1.0 - touch)), vec3(0.90, 1.06, 1.12));  // lids send back red light
     // the corner: the fold is pink, the caruncle redder and dull
     // no brighter than the sclera that it stands beside
-    vec3 flesh = mix(vec3(1.02, 0.66, 0.62), vec3(1.08, 0.64, 0.56), caruncle) * sclera_colour * (1.0 + 0.22 * fbm(solid / 0.55) - 0.14 * fbm(solid / 0.25));
+    vec3 flesh = mix(vec3(1.24, 0.84, 0.79), vec3(1.30, 0.80, 0.71), caruncle) * sclera_colour * (1.0 + 0.22 * fbm(solid / 0.55) - 0.14 * fbm(solid / 0.25));
     albedo = mix(albedo, flesh, clamp(tissue * (1.0 + 0.5 * noise(solid / 0.6)), 0.0, 1.0));
 
     // tears: thin everywhere, with a meniscus along the lids where the normal swings away from them

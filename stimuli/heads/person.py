@@ -124,7 +124,7 @@ class Eyes(Parameters):
         2.4, unit="mm, over which it falls by e", low=0.2, high=10.0, source="by eye"
     )
     lid_shade_shares: tuple[float, float, float, float] = parameter(
-        (0.5, 0.62, 0.65, 0.42),
+        (0.5, 0.40, 0.55, 0.36),
         unit="of lid_shade: at the lower lid, the corners, where a lid touches, the ball's sides",
         low=0.0,
         high=1.0,

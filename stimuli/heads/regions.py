@@ -130,7 +130,7 @@ class Regions(Parameters):
         (2.8, 4.5, 6.0), unit="mm", low=0.0, high=50.0, source="by eye"
     )
     line_noise_scale_mm: float = parameter(9.0, unit="mm", low=0.5, high=200.0, source="by eye")
-    hairline_soft_mm: tuple[float, float] = _ramp(-5.0, 7.0)
+    hairline_soft_mm: tuple[float, float] = _ramp(-9.0, 13.0)
     hairline_deg: tuple[float, float] = _degrees(60.0, 30.0)
     beard_top_soft_mm: tuple[float, float] = _ramp(-5.0, 13.0)
     beard_bottom_soft_mm: tuple[float, float] = _ramp(-14.0, 14.0)
