@@ -295,7 +295,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool ma
     h = mix(h, vermilion, lips);
     thickness = mix(thickness, lip_epidermis, lips);
     // hair below the surface: scalp and shaven beard, dots that merge with distance
-    hair = layer_hair * smoothstep(0.15, 1.0, hair);  // before the line hairs are too few to tint the skin
+    hair = layer_hair * smoothstep(0.45, 1.0, hair);  // before the line hairs are too few to tint the skin
     beard *= layer_hair;
     float rooted = hair * (0.75 + 0.25 * noise(q / 4.0)), shaven = beard * (1.0 - hair) * clamp(0.75 + 0.35 * patchy + 0.35 * waves.middle.x, 0.0, 1.2), dots = 0.05;
     if (max(rooted, shaven) > 0.02) {

@@ -183,9 +183,9 @@ class Skin(Material):
     epidermis_mm: float = _layers("epidermis_mm")
     turbidity: float = _layers("turbidity")
     flush: float = parameter(0.026, unit="share of blood more", low=0.0, high=0.3, source="by eye")
-    mottling: float = parameter(1.0, low=0.0, high=5.0, source="of what was chosen by eye")
+    mottling: float = parameter(0.65, low=0.0, high=5.0, source="of what was chosen by eye")
     uneven: tuple[float, float] = parameter(
-        (0.32, 0.44), unit="of melanin, of blood", low=0.0, high=2.0, source="by eye"
+        (0.20, 0.27), unit="of melanin, of blood", low=0.0, high=2.0, source="by eye"
     )
     eyelid_blood: float = parameter(
         0.006, unit="share of blood more", low=0.0, high=0.3, source="by eye"
@@ -266,7 +266,7 @@ class Skin(Material):
     furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.030 mm")
     bumps: float = parameter(1.0, low=0.0, high=5.0, source="height, of `bumps_mm`")
     bumps_mm: tuple[float, float, float] = parameter(
-        (0.042, 0.085, 0.20),
+        (0.045, 0.060, 0.11),
         unit="mm over 1.6, 4.1 and 11 mm",
         low=0.0,
         high=1.0,
@@ -380,7 +380,7 @@ class Skin(Material):
         lips, inner = lip_places(column["lips"])
         dull = albedo @ LUMA[:, None] * np.array(self.lip_haze_colour)
         albedo = albedo + self.lip_haze * lips * (1 - 0.5 * inner) * (dull - albedo)
-        hair = _smoothstep(0.15, 1.0, column["hair"])
+        hair = _smoothstep(0.45, 1.0, column["hair"])
         rooted, shaven = 0.75 * hair, 0.75 * self.beard * column["beard"] * (1 - hair)
         albedo = albedo * (1 + self.scalp * hair * (np.array(SCALP) - 1))
         dots = 0.45 * DOTS_MEAN * np.maximum(rooted, 0.75 * shaven)
