@@ -19,13 +19,20 @@ uniform int block;             // pixels that share a rotation, along one side
 layout(location = 0) out vec4 scattered;
 layout(location = 1) out vec4 count;
 
-// A mean over a texel spreads what it stands for by half its squared side: box and tent, along both axes (renderer/optics/rings.py).
-const float TEXEL_VARIANCE = 0.5;
+// A mean spreads what it stands for by half its squared side, box and tent along both axes, and a pixel that is read bilinearly by a sixth
+// (renderer/optics/rings.py).
+const float TEXEL_VARIANCE = 0.5, PIXEL_VARIANCE = 1.0 / 6.0;
 const float SMALLER = 2.0;     // levels
-const float LOST = 1.0;        // pixels of each row of a mean that may be missing; a step of depth takes two
+const float LOST = 0.5;     // pixels of each row of a mean that may be missing; a step of depth takes two
 const float STEEPEST = 8.0;    // slope of depth; what is steeper is a silhouette
 
 vec3 profile(float r) { vec3 third = exp(-shape * r / 3.0); return shape * (third * third * third + third) / r; }
+
+// By how much a read between two levels spreads it, in squared pixels.
+float spread_of(float level) {
+    float low = floor(level), side = exp2(low);
+    return mix(low < 0.5 ? PIXEL_VARIANCE : TEXEL_VARIANCE * side * side, TEXEL_VARIANCE * 4.0 * side * side, level - low);
+}
 
 // Which even part of the turn between two taps a pixel of a block takes.
 float part_of_block(ivec2 within) {
@@ -42,7 +49,7 @@ void main() {
     float depth = texelFetch(depths, at, 0).x, scale = pixels_per_mm / max(depth, 1e-3), pixel_mm = 1.0 / scale;
     vec2 slope = vec2(dFdx(depth), dFdy(depth)) * scale;
     if (!skin || filter_radius_mm * scale < 1.0) return;
-    float foreshortened = max(abs(slope.x), abs(slope.y)) < STEEPEST ? inversesqrt(1.0 + dot(slope, slope)) : 1.0;
+    float narrower = max(abs(slope.x), abs(slope.y)) < STEEPEST ? -0.5 * log2(1.0 + dot(slope, slope)) : 0.0;
     vec4 tile = texelFetch(chosen, at / TILE, 0);
     int set = int(tile.x), first = int(firsts[set]), parts = block * block;
     ivec2 pixel = ivec2(image_pixel()), within = pixel % block;
@@ -58,20 +65,20 @@ void main() {
         vec4 tap = texelFetch(taps, ivec2(k, row), 0);
         weights = texelFetch(taps, ivec2(k, row + 1), 0);
         vec2 towards = rotation * tap.yz, there;
-        float squared = tap.x * tap.x, spread = TEXEL_VARIANCE * tap.w * tap.w;
-        float level = clamp(log2(tap.w * foreshortened * scale), 0.0, levels);
+        float fitted = max(log2(tap.w * scale), 0.0), level = clamp(fitted + narrower, 0.0, levels);
+        float squared = tap.x * tap.x, whole_spread = squared + spread_of(fitted) * pixel_mm * pixel_mm;
         vec4 mean = vec4(0.0);
         bool averaged = false;
         for (int j = 0; j < sizes && !averaged; ++j) {
             // what another side than the fitted one spreads more or less by comes off the radius or on it
-            float side = exp2(level), read = side * pixel_mm;
-            there = gl_FragCoord.xy + sqrt(max(squared + spread - TEXEL_VARIANCE * read * read, 0.04 * squared)) * towards;
+            float side = exp2(level);
+            there = gl_FragCoord.xy + sqrt(max(whole_spread - spread_of(level) * pixel_mm * pixel_mm, 0.04 * squared)) * towards;
             mean = textureLod(guarded, there / padded, level);
             averaged = mean.a >= max(whole, 1.0 - LOST / side);
             level = max(level - SMALLER, 0.0);
         }
         if (!averaged) {
-            there = gl_FragCoord.xy + sqrt(squared + max(spread - TEXEL_VARIANCE * pixel_mm * pixel_mm, 0.0)) * towards;
+            there = gl_FragCoord.xy + sqrt(whole_spread) * towards;
             mean = texture(irradiance, (clamp(floor(there), vec2(0.0), size - 1.0) + 0.5) / size);
             if (mean.a < 0.5) continue;
             mean.a = 1.0;

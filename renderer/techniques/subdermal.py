@@ -6,10 +6,10 @@ importance sampling", doi:10.1111/j.1467-8659.2008.01252.x), but only where a gu
 step of depth and nothing that is not skin is in them. Their radii and weights are fitted to the
 profile (renderer/optics/rings.py), a pixel's own light being the first. The pixels of a block share
 a rotation and turn by even parts of it, so that a ring is met at even angles and what is linear in
-its light cancels; those that face each other have the same radii and every pair its own, so that a
-block has more rings than a pixel. How many taps a pixel takes is decided for tiles of 8 x 8 pixels,
-from their means, before any tap is taken: no tap both decides and estimates. docs/subdermal.md has
-what each part is worth.
+its light cancels; those that face each other have the same radii and every pair its own where
+rings are larger than a pixel, so that a block has more of them. How many taps a pixel takes is
+decided for tiles of 8 x 8 pixels, from their means, before any tap is taken: no tap both decides
+and estimates. docs/subdermal.md has what each part is worth.
 """
 
 from __future__ import annotations
@@ -34,39 +34,50 @@ from renderer.techniques.screen import Canvas
 SETS = ((2, 1), (3, 1), (4, 1), (5, 1), (6, 1), (4, 2), (5, 2), (5, 3), (5, 4), (6, 5))
 COUNTS = tuple(1 + rings * taps for rings, taps in SETS)
 TILE = 8  # pixels
+LARGEST = 2.0  # widest distances: pixels that are larger ask for no more taps
 LEVELS = 6  # of the pyramid: means over 64 x 64 pixels
 PAD = 1 << LEVELS  # so that every mean is one of whole pixels
 RUNG = 1.3  # between the sizes of a pixel for which sets are fitted
 #: Taps of a ring are means over texels whose side falls with their number to this power.
 NARROWER = 0.5
 #: fewest, by_spread, by_unguarded of `preset`: golubev's error with 22 samples over the skin of the
-#: thesis's scene; two thirds of it (docs/subdermal.md, where other media are too).
-PRESETS = {"equal_error": (3.0, 3.0, 50.0), "safe": (5.0, 20.0, 80.0)}
+#: thesis's scene; less than two thirds of it (docs/subdermal.md, where other media are too).
+PRESETS = {"equal_error": (3.0, 4.0, 55.0), "safe": (6.0, 18.0, 100.0)}
 LEAST = 1e-30  # of a profile: what lies farther out has no weight that floats can hold
 
 
 @dataclass(frozen=True)
 class Subdermal(BurleyFilter):
-    """n = fewest + by_spread s + by_unguarded sqrt(u) min(1, s / full_spread) taps, of SETS'.
+    """n = fewest + by_size p + by_spread s + by_unguarded sqrt(u) min(1, s / full_spread) / (1 + p)
+    taps, of SETS'.
 
-    s: relative spread of the irradiance of the widest channel about the tile; u: the share of skin
-    there that the guard keeps from being averaged. Where a block is a single pixel n is `lone`
-    times that, since none of its noise cancels. kernel "burley": rings are fitted to Burley's
-    profile; "curve": to the medium's own curve, which few profiles of one parameter can be.
+    p: a pixel's size over the widest distance, at most LARGEST: means of fewer pixels average less
+    noise, and one that is refused takes less with it; s: relative spread of the irradiance of the
+    widest channel about the tile; u: the share of skin there that the guard keeps from being
+    averaged. Where a block is a single pixel n is `lone` times that, since none of its noise
+    cancels. kernel "burley": rings are fitted to Burley's profile; "curve": to the medium's own
+    curve, which few profiles of one parameter can be.
     """
 
     preset: str = parameter(
         "own", choices=("own", *PRESETS), source="own: the three numbers below; else PRESETS"
     )
-    fewest: float = parameter(3.0, unit="taps", low=3.0, high=31.0, source="docs/subdermal.md")
+    fewest: float = parameter(4.0, unit="taps", low=3.0, high=31.0, source="docs/subdermal.md")
+    by_size: float = parameter(
+        1.5,
+        unit="taps, where a pixel is as large as the widest distance; twice at most",
+        low=0.0,
+        high=100.0,
+        source="docs/subdermal.md",
+    )
     by_spread: float = parameter(
-        10.0, unit="taps, of a relative spread of 1", low=0.0, high=1e3, source="docs/subdermal.md"
+        8.0, unit="taps, of a relative spread of 1", low=0.0, high=1e3, source="docs/subdermal.md"
     )
     by_unguarded: float = parameter(
-        50.0, unit="taps, where all is unguarded", low=0.0, high=1e3, source="docs/subdermal.md"
+        55.0, unit="taps, where all is unguarded", low=0.0, high=1e3, source="docs/subdermal.md"
     )
     full_spread: float = parameter(
-        0.1, unit="relative spread", low=1e-6, high=10.0, source="docs/subdermal.md"
+        0.3, unit="relative spread", low=1e-6, high=10.0, source="docs/subdermal.md"
     )
     neighbourhood: float = parameter(
         2.2,
@@ -82,7 +93,7 @@ class Subdermal(BurleyFilter):
         1.3, unit="of a tap's radius", low=0.0, high=4.0, source="docs/subdermal.md"
     )
     noise: float = parameter(
-        0.01,
+        0.005,
         unit="over the pixels of a block, see renderer.optics.rings.fit",
         low=0.0,
         high=1.0,
@@ -114,7 +125,7 @@ class Subdermal(BurleyFilter):
     )
     radii: float = parameter(
         0.6,
-        unit="natural logarithm of the range over which a block spreads a ring's radius",
+        unit="natural logarithm of the range over which a block spreads a ring of two pixels up",
         low=0.0,
         high=2.0,
         source="docs/subdermal.md",
@@ -137,7 +148,9 @@ class Subdermal(BurleyFilter):
         return inputs.supersample if self.blocks else 1
 
     def factors(self, block: int) -> np.ndarray:
-        """By what the pairs of a block's pixels that face each other multiply a ring's radius."""
+        """By what the pairs of a block's pixels that face each other multiply a large ring's radius
+        (renderer.optics.rings.spread).
+        """
         pairs = _pairs(block)
         return np.exp(self.radii * ((np.arange(pairs) + 0.5) / pairs - 0.5))
 
@@ -175,7 +188,7 @@ class Subdermal(BurleyFilter):
                 for k, (ring, weights) in enumerate(
                     zip(fitted.radius_mm, fitted.weights, strict=True)
                 ):
-                    r = ring * factors[pair if k % 2 else -1 - pair]
+                    r = float(rings.spread(ring, factors[pair if k % 2 else -1 - pair], pixel))
                     near = max(r, pixel)
                     profile = (np.exp(-near / d) + np.exp(-near / d / 3)) / (d * near)
                     number = taps if k else 1
@@ -193,7 +206,7 @@ class Subdermal(BurleyFilter):
         block = self.block(inputs)
         size = [-(-side // PAD) * PAD for side in (inputs.width, inputs.height)]
         tiled = [side // TILE for side in size]
-        defines = {"TILE": TILE, "SETS": len(SETS)}
+        defines = {"TILE": TILE, "SETS": len(SETS), "LARGEST": LARGEST}
         floats = [GL.GL_RGBA32F]
         with (
             gl.Target(*size, floats, linear=True, mipmap=True) as guarded,
@@ -216,6 +229,8 @@ class Subdermal(BurleyFilter):
                     sigma_mm=self.neighbourhood * float(d.max()),
                     by=np.array(self.counting) * (self.lone if block == 1 else 1.0),
                     full_spread=self.full_spread,
+                    by_size=self.by_size * (self.lone if block == 1 else 1.0),
+                    widest_mm=float(d.max()),
                     counts=np.array(COUNTS, float),
                     ladder=(first, np.log(RUNG)),
                 )

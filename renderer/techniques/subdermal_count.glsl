@@ -3,6 +3,8 @@ uniform sampler2D tiles; uniform sampler2D tile_depths;
 uniform float pixels_per_mm;
 uniform float sigma_mm;     // of the Gaussian of the neighbourhood
 uniform vec3 by;            // taps: of every pixel, by the spread, by the share without guard
+uniform float by_size;      // taps: where a pixel is as large as the widest distance
+uniform float widest_mm;    // that distance
 uniform float full_spread;  // from this spread on that share counts in full
 uniform float counts[SETS];
 uniform vec2 ladder;        // the first rung of the sizes of a pixel, and the logarithm of their ratio
@@ -30,7 +32,8 @@ void main() {
     }
     sum /= max(total, 1e-6);
     float spread = sqrt(max(sum.y - sum.x * sum.x, 0.0)) / max(sum.x, 1e-4);
-    float n = by.x + by.y * spread + by.z * sqrt(sum.w) * min(1.0, spread / full_spread);
+    float p = min(pixel_mm / widest_mm, LARGEST);
+    float n = by.x + by_size * p + by.y * spread + by.z * sqrt(sum.w) * min(1.0, spread / full_spread) / (1.0 + p);
     int set = 0;
     for (int k = 1; k < SETS; ++k) if (n >= 0.5 * (counts[k - 1] + counts[k])) set = k;
     chosen = vec4(float(set), counts[set], floor(log(pixel_mm) / ladder.y + 0.5) - ladder.x, 0.0);

@@ -53,8 +53,8 @@ BESIDE = (
     *(f"golubev:samples={count}" for count in (6, 9, 12, 16, 22, 30)),
     "golubev_adaptive",
     "subdermal",
-    "subdermal:by_spread=3",
-    "subdermal:fewest=5:by_spread=20:by_unguarded=80",
+    "subdermal:preset=equal_error",
+    "subdermal:preset=safe",
 )
 #: Table 4.1: samples of a picture, the mean over three angles.
 PUBLISHED = {

@@ -109,7 +109,8 @@ def _steps(axis, scene, table, framing, techniques, options):
     elif axis == "samples":
         made = chosen([f"golubev:samples={n}" for n in SAMPLES])
         made |= chosen([f"golubev_plus:base_samples={n // 2}:samples={n}" for n in SAMPLES])
-        made |= chosen([f"subdermal:fewest={n}:by_spread=0:by_unguarded=0" for n in (3, 6, 12, 24)])
+        even = "by_size=0:by_spread=0:by_unguarded=0"
+        made |= chosen([f"subdermal:fewest={n}:{even}" for n in (3, 6, 12, 24)])
         yield 0, table, options.size, made
     elif axis == "triangles":
         for count in BALLS:

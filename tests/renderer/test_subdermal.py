@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import renderer
-from renderer.techniques.subdermal import COUNTS, SETS, TILE, part_of_block
+from renderer.techniques.subdermal import COUNTS, RUNG, SETS, TILE, part_of_block
 from tests.renderer.slab import scatter
 from tests.renderer.test_techniques import SKIN
 
@@ -36,7 +36,9 @@ def test_the_sets_are_in_order_and_count_their_taps(bare):
 
 
 def test_the_pixels_of_a_block_that_face_each_other_have_the_same_radii(bare):
-    """Half a turn apart; other pairs have radii of their own, whose geometric mean is the ring."""
+    """Half a turn apart; other pairs have radii of their own, whose geometric mean is the ring,
+    but for rings that are no larger than a pixel.
+    """
     technique = renderer.make("subdermal")
     radius = technique.taps(SKIN, -8, 2)[::2, :, 0]
     parts = [part_of_block(pixel, 2) for pixel in range(4)]
@@ -45,11 +47,14 @@ def test_the_pixels_of_a_block_that_face_each_other_have_the_same_radii(bare):
     np.testing.assert_array_equal(by_part[0], by_part[2])
     np.testing.assert_array_equal(by_part[1], by_part[3])
     ringed = by_part[0] > 0
+    mean = np.sqrt(by_part[0] * by_part[1])[ringed]
+    share = np.clip(mean / RUNG**-8 - 1, 0, 1)
     ratio = by_part[0][ringed] / by_part[1][ringed]
-    np.testing.assert_allclose(np.abs(np.log(ratio)), 0.5 * technique.radii, rtol=1e-9)
+    np.testing.assert_allclose(np.abs(np.log(ratio)), 0.5 * technique.radii * share, atol=1e-9)
+    assert share.min() < 0.3 and share.max() == 1
     rings = [r for one in technique.sets(SKIN, -8, 2) for r in one.radius_mm[1:]]
-    mean = np.unique(np.round(np.sqrt(by_part[0] * by_part[1])[ringed], 9))
-    np.testing.assert_allclose(mean, np.unique(np.round(rings, 9)))
+    mean, rings = (np.unique(np.round(one, 9)) for one in (mean, rings))
+    np.testing.assert_allclose(mean, rings)
     same = renderer.make("subdermal", {"radii": 0.0}).taps(SKIN, -8, 2)
     np.testing.assert_array_equal(same[0], same[2])
 
@@ -70,13 +75,13 @@ def test_even_light_takes_the_fewest_taps_and_an_edge_more(bare):
     flat = replace(bare.flat(even, SKIN, DEPTH, SCALE), supersample=2)
     _, count = scatter(renderer.make("subdermal"), flat)
     inner = count[TILE:-TILE, TILE:-TILE, 0]
-    assert (inner == 3).all()
+    assert (inner == 4).all()
     edge = even.copy()
     edge[:, 128:] = 0.1
     flat = replace(bare.flat(edge, SKIN, DEPTH, SCALE), supersample=2)
     _, count = scatter(renderer.make("subdermal"), flat)
     columns = count[TILE:-TILE, :, 0]
-    assert columns[:, 120:136].min() > 6 and columns[:, 16:40].max() == 3
+    assert columns[:, 120:136].min() > 6 and columns[:, 16:40].max() == 4
     tiles = count[..., 0].reshape(64 // TILE, TILE, 256 // TILE, TILE)
     assert (tiles == tiles[:, :1, :, :1]).all()  # decided for tiles, before any tap
 
@@ -143,12 +148,23 @@ def test_a_filter_narrower_than_a_pixel_leaves_light_as_it_is(bare):
     assert (count[..., 0] == 1).all()
 
 
+def test_coarser_pixels_take_more_taps_up_to_twice_the_widest_distance(bare):
+    even = np.full((64, 256, 3), 1.3)
+    distance = float(renderer.make("subdermal").distances(SKIN).max())
+    counts = []
+    for pixels in (0.2, 1.0, 2.0, 3.0):  # a pixel, in widest distances
+        flat = replace(bare.flat(even, SKIN, SCALE * distance * pixels, SCALE), supersample=2)
+        technique = renderer.make("subdermal", {"by_size": 2.8})
+        counts.append(scatter(technique, flat)[1][TILE:-TILE, TILE:-TILE, 0].mean())
+    assert counts == [5, 7, 9, 9]
+
+
 def test_a_preset_is_its_three_numbers(bare):
     inputs = replace(bare.flat(relief(), SKIN, DEPTH, SCALE), supersample=2)
     counts = {}
     for name, given in {
         "safe": {"preset": "safe"},
-        "numbers": {"fewest": 5.0, "by_spread": 20.0, "by_unguarded": 80.0},
+        "numbers": {"fewest": 6.0, "by_spread": 18.0, "by_unguarded": 100.0},
         "equal": {"preset": "equal_error"},
         "own": {},
     }.items():

@@ -117,7 +117,7 @@ BOUNDS = {
     "golubev_adaptive": (0.006, 0.16, 0.16, 0.012),
     # few taps where light is even: few rings cannot follow red's far end, and in a block of one
     # pixel blue, a pixel wide, is widened for less noise
-    "subdermal": (0.011, 0.18, 0.16, 0.07),
+    "subdermal": (0.006, 0.18, 0.16, 0.04),
 }
 
 
