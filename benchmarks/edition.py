@@ -2,11 +2,14 @@
 
     make bench BENCH=edition              against the commit 65e2347, the first edition
     PYTHONPATH=. .venv/bin/python benchmarks/edition.py --build --commit COMMIT
+    PYTHONPATH=. .venv/bin/python benchmarks/edition.py --build --alone
 
 `render` draws the thesis scene's head-shot by golubev at 1920x1080, 2x2; the first time from empty
 caches (but for the fetched head data), then again, then by another technique. --build also builds
-the 15 images of the thesis study. The earlier edition is checked out into a worktree and run with
-this one's packages. Images of both are compared in levels of 255.
+the 15 images of the thesis study, once with the head and the light that `render` has made and once
+from empty caches.
+The earlier edition is checked out into a worktree and run with this one's packages. Images of both
+are compared in levels of 255. --alone measures this edition and no other.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from stimuli.heads import fetch
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRST = "65e2347"
+WHAT = ("CPU s", "wall s", "peak MB")
 
 
 def run(tree: Path, cache: Path, *args: str) -> tuple[float, float, float]:
@@ -66,11 +70,15 @@ def main() -> None:
     ask.add_argument("--commit", default=FIRST, help="the earlier edition")
     ask.add_argument("--build", action="store_true", help="also build the thesis study")
     ask.add_argument("--size", default="1920x1080", help="of the images that `render` draws")
+    ask.add_argument("--alone", action="store_true", help="without the earlier edition")
     options = ask.parse_args()
     fetch.mpfb_data()
     with tempfile.TemporaryDirectory(prefix="subdermal-edition-") as scratch:
         work = Path(scratch)
         old = work / "old"
+        if options.alone:
+            compare(work, None, options)
+            return
         git = ["git", "-C", str(ROOT), "worktree"]
         subprocess.run([*git, "add", "--quiet", "--detach", old, options.commit], check=True)
         try:
@@ -79,31 +87,41 @@ def main() -> None:
             subprocess.run([*git, "remove", "--force", old], check=True)
 
 
-def compare(work: Path, old: Path, options: argparse.Namespace) -> None:
-    """Print the table."""
-    cache = work / "cache"
+def emptied(work: Path, name: str) -> Path:
+    """A folder of caches with nothing in it but the fetched head data."""
+    cache = work / name
     cache.mkdir()
     for data in caches.folder().glob("mpfb2-*"):
         (cache / data.name).symlink_to(data)
+    return cache
+
+
+def compare(work: Path, old: Path | None, options: argparse.Namespace) -> None:
+    """Print the table."""
+    cache = emptied(work, "cache")
     asked = ["render", "-f", "head-shot", "--size", options.size]
     rows = [
-        ("render, first", [*asked, "-t", "golubev"]),
-        ("render, again", [*asked, "-t", "golubev"]),
-        ("render, other technique", [*asked, "-t", "jimenez_separable"]),
+        ("render, first", cache, [*asked, "-t", "golubev"]),
+        ("render, again", cache, [*asked, "-t", "golubev"]),
+        ("render, other technique", cache, [*asked, "-t", "jimenez_separable"]),
     ]
     if options.build:
-        rows.append(("build, 15 images", ["build", "stimuli/studies/thesis.toml"]))
-    print(f"{'':<26}{'CPU s':>16}{'ratio':>8}{'wall s':>18}{'peak MB':>16}")
-    for k, (title, args) in enumerate(rows):
-        made = []
-        for edition, tree in (("old", old), ("new", ROOT)):
-            out = work / f"{edition}{k}{'' if args[0] == 'build' else '.png'}"
-            made.append((out, run(tree, cache, *args, "--out", str(out))))
-        (_, (c0, w0, p0)), (_, (c1, w1, p1)) = made
-        numbers = f"{c0:>7.1f} {c1:>8.1f}{c1 / c0:>8.2f}{w0:>9.1f} {w1:>8.1f}{p0:>8.0f} {p1:>7.0f}"
-        print(f"{title:<26}{numbers}", flush=True)
-        if args[0] == "render":
-            print(f"{'':<26}{difference(made[0][0], made[1][0])}", flush=True)
+        build = ["build", "stimuli/studies/thesis.toml"]
+        rows.append(("build, head and light kept", cache, build))
+        rows.append(("build, from empty caches", emptied(work, "empty"), build))
+    editions = {"old": old, "new": ROOT} if old else {"new": ROOT}
+    titles = "".join(f"{f'{what}, {edition}':>14}" for what in WHAT for edition in editions)
+    print(f"{'':<28}{titles}{'CPU, ratio':>12}" if old else f"{'':<28}{titles}")
+    for k, (title, kept, args) in enumerate(rows):
+        images, spent = [], []
+        for edition, tree in editions.items():
+            images.append(work / f"{edition}{k}{'' if args[0] == 'build' else '.png'}")
+            spent.append(run(tree, kept, *args, "--out", str(images[-1])))
+        numbers = "".join(f"{one:>14.1f}" for of_one in zip(*spent, strict=True) for one in of_one)
+        ratio = f"{spent[-1][0] / spent[0][0]:>12.2f}" if old else ""
+        print(f"{title:<28}{numbers}{ratio}", flush=True)
+        if old and args[0] == "render":
+            print(f"{'':<28}{difference(*images)}", flush=True)
 
 
 if __name__ == "__main__":

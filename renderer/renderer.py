@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 import pyrender
 
-from renderer import VERSION, gl, kept
+from renderer import VERSION, caches, gl, kept
 from renderer.errors import InputError
 from renderer.frame import Frame
 from renderer.memory import give_back, give_back_large
@@ -153,10 +153,11 @@ class Renderer:
         give_back()
 
     def put_by(self) -> None:
-        """Free the lamps' maps and the hair where all that they are for is kept: whoever asks for
-        them after all has them read from there.
+        """Free the lamps' maps and the hair where they are kept, or all that they are for: whoever
+        asks for them after all has them read from there.
         """
-        if self.keep.issuperset(kept.CACHES):
+        kept_here = "shadows" in self.keep and caches.there("shadows", self.kept_as)
+        if kept_here or self.keep.issuperset(kept.CACHES):
             for name in ("lamps", "hair"):
                 self.__dict__.pop(name, None)
             gl.draw_nothing()  # which was drawn with them

@@ -29,7 +29,7 @@ SEGMENTS = 4  # of a piece: what is left out or sorted as one
 CHUNK = 32768  # pieces that are put on the graphics card at a time
 ROWS = 64  # of points that are reckoned and put there at a time
 #: What `Hair.fixed` makes.
-FIXED = ("places", "tangents", "covers", "colours", "environments")
+FIXED = ("places", "tangents", "covers", "normals", "colours", "environments")
 
 
 class Hair:
@@ -57,17 +57,21 @@ class Hair:
         self._fixed: dict[str, gl.Texture] = {}
         self._lit: gl.TextureArray | None = None
 
-    def _per_point(self, values: Callable[[slice, np.ndarray], tuple]) -> gl.Texture:
-        """A texture of `values`, which makes xyz (K, 3) and w (K,) of some points from their place
-        and their strands.
+    def _per_point(self, values: Callable[[slice, np.ndarray], tuple], channels=4) -> gl.Texture:
+        """A texture of 4 channels or 1. values: makes them, (K,) or (K, C) side by side, for some
+        points and their strands (K,).
         """
-        texture = gl.Texture(COLUMNS, self.rows, GL.GL_RGBA32F)
+        form = {1: GL.GL_R32F, 4: GL.GL_RGBA32F}[channels]
+        texture = gl.Texture(COLUMNS, self.rows, form)
         for part in bands(self.rows * COLUMNS):
-            texels = np.zeros((part.stop - part.start, 4), np.float32)
+            texels = np.zeros((part.stop - part.start, channels), np.float32)
             own = slice(part.start, min(part.stop, len(self.points)))
-            count = own.stop - own.start
-            texels[:count, :3], texels[:count, 3] = values(own, self.of[own])
-            texture.write_rows(part.start // COLUMNS, texels.reshape(-1, COLUMNS, 4))
+            first = 0
+            for made in values(own, self.of[own]):
+                made = made.reshape(len(made), -1)
+                last = first + made.shape[1]
+                texels[: len(made), first:last], first = made, last
+            texture.write_rows(part.start // COLUMNS, texels.reshape(-1, COLUMNS, channels))
         return texture
 
     def _per_strand(self, xyz: np.ndarray, w: np.ndarray | float) -> gl.Texture:
@@ -99,7 +103,10 @@ class Hair:
         return self._per_point(lambda part, of: (tangents(self.points, first, part, of), of))
 
     def _covers(self) -> gl.Texture:
-        return self._per_point(lambda part, of: (self.normals[of], self.strands.cover[part]))
+        return self._per_point(lambda part, of: (self.strands.cover[part],), channels=1)
+
+    def _normals(self) -> gl.Texture:
+        return self._per_strand(self.normals, 0.0)
 
     def _colours(self) -> gl.Texture:
         return self._per_strand(self.strands.colour, self.strands.sheen)
@@ -108,7 +115,7 @@ class Hair:
         return self._per_strand(self.environment, self.strands.first[:-1])
 
     def rest(self) -> None:
-        """Free what `fixed` has put on the graphics card, 50 bytes a point: it is made anew at
+        """Free what `fixed` has put on the graphics card, 40 bytes a point: it is made anew at
         need.
         """
         for texture in self._fixed.values():

@@ -5,6 +5,7 @@
 #include "shaders/common.glsl"
 #include "shaders/lighting.glsl"
 uniform sampler2D places; uniform sampler2D tangents; uniform sampler2D covers;
+uniform sampler2D normals;       // a strand's: of the skin at its root
 uniform sampler2D colours;       // a strand's: rgb: what two ways through the fibre leave of light; w: share of mirrored light that whole scales would mirror
 uniform sampler2D environments;  // a strand's: light from everywhere on the skin at the root; w: its first point
 uniform sampler2DArray lit_map;  // (passes/hair_lit.frag)
@@ -40,9 +41,9 @@ void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec3 p = texelFetch(places, at, 0).xyz;
     vec4 t = texelFetch(tangents, at, 0);
-    vec4 cover = texelFetch(covers, at, 0);
     int strand = int(t.w + 0.5), columns = textureSize(colours, 0).x;
     ivec2 own = ivec2(strand % columns, strand / columns);
+    vec4 cover = vec4(texelFetch(normals, own, 0).xyz, texelFetch(covers, at, 0).r);  // w: of the layer above
     vec4 fibre_own = texelFetch(colours, own, 0);
     vec3 colour = fibre_own.rgb;
     float sheen = fibre_own.w;

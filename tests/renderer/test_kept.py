@@ -91,6 +91,28 @@ def test_another_camera_has_buffers_of_its_own_and_the_same_maps(folder, monkeyp
     assert len(list((folder / "views").iterdir())) == 2
 
 
+def test_maps_are_put_by_while_techniques_take_their_light(monkeypatch):
+    """As a build has it: they are read again for the next view, and it is the same to the bit."""
+    other = replace(CAMERA, yaw_deg=-30.0)
+    with opened(keep=()) as drawing:
+        plain = [*drawn(drawing, TECHNIQUES[0]), *drawn(drawing, *TECHNIQUES, camera=other)]
+        assert vars(drawing).keys() >= {"lamps", "hair"}
+    with opened(keep=("shadows",)) as drawing:
+        again = drawn(drawing, TECHNIQUES[0])
+        assert not vars(drawing).keys() & {"lamps", "hair"}
+        monkeypatch.setattr(Lamps, "draw", None)  # nobody may call it
+        again += drawn(drawing, *TECHNIQUES, camera=other)
+    for one, two in zip(plain, again, strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_maps_that_could_not_be_kept_stay(monkeypatch):
+    monkeypatch.setenv("SUBDERMAL_CACHE_MB", "0")
+    with opened(keep=("shadows",)) as drawing:
+        drawn(drawing, TECHNIQUES[0])
+        assert vars(drawing).keys() >= {"lamps", "hair"}
+
+
 def test_a_key_follows_all_that_a_scene_has():
     def key(graph, **changed):
         with renderer.Renderer(

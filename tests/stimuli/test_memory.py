@@ -178,5 +178,5 @@ def test_what_somebody_holds_is_seen(study, tmp_path, monkeypatch):
     watch = Watch(monkeypatch, held=[])
     build(study, tmp_path / "out")
     assert watch.left[0] == set()
-    assert watch.left[2] >= {f"{what} of man" for what in ("points", "hair", "lamps", "renderer")}
+    assert watch.left[2] >= {f"{what} of man" for what in ("points", "drawn", "frame", "renderer")}
     assert "positions of woman" in watch.left[2] and "points of woman" in watch.given[1]
