@@ -1,6 +1,7 @@
 """Memory that is freed and memory that is given back are two things."""
 
 import ctypes
+from collections.abc import Iterator
 
 M_MMAP_THRESHOLD = -3  # of glibc's malloc.h
 LARGE = 1 << 20
@@ -22,3 +23,9 @@ def give_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
+
+
+def parts(count: int, at_once: int) -> Iterator[slice]:
+    """`count` things, so many at once: what is reckoned of each is never there for all."""
+    for start in range(0, count, at_once):
+        yield slice(start, min(start + at_once, count))

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from renderer.memory import parts
 from renderer.scene.graph import Item
 from renderer.scene.lights import DistantLight, Light, SpotLight
 from renderer.scene.material import Skin
@@ -264,8 +265,7 @@ class Tracer:
         local = hemisphere(rays)
         hits = np.empty((len(points), rays), dtype=np.int32)
         directions = np.empty((len(points), rays, 3), dtype=np.float32)
-        for start in range(0, len(points), CHUNK):
-            part = slice(start, start + CHUNK)
+        for part in parts(len(points), CHUNK):
             d = np.einsum("nij,rj->nri", frames(normals[part], spin[part]), local)
             origin = np.repeat(points[part] + OFFSET_MM * normals[part], rays, axis=0)
             hits[part] = self._rays.intersects_first(origin, d.reshape(-1, 3)).reshape(-1, rays)
@@ -281,8 +281,7 @@ class Tracer:
         """
         n, rays = hits.shape
         light = np.empty((n, 3, 3))
-        for start in range(0, n, CHUNK):
-            part = slice(start, start + CHUNK)
+        for part in parts(n, CHUNK):
             d, h = directions[part].astype(float), hits[part]
             radiance = self._radiance(d.reshape(-1, 3)).reshape(*h.shape, 3)
             radiance = np.where(h[..., None] < 0, radiance, sent[h])
@@ -332,10 +331,10 @@ def bake(
     directions, hits = tracer.gather(points, normals, rays)
     # rays that start inside (folded lips, the back of the eyes) meet back faces: those send nothing
     outwards = tracer.mesh.face_normals.astype(np.float32)
-    for first in range(0, len(points), CHUNK):
-        met = hits[first : first + CHUNK]
+    for part in parts(len(points), CHUNK):
+        met = hits[part]
         facing = outwards[np.maximum(met, 0)]
-        away = np.einsum("nri,nri->nr", directions[first : first + CHUNK], facing) > 0
+        away = np.einsum("nri,nri->nr", directions[part], facing) > 0
         met[(met >= 0) & away] = len(faces)
     irradiance = lamps
     for _ in range(BOUNCES + 1):
@@ -343,16 +342,16 @@ def bake(
         sent = np.vstack([sent, np.zeros(3)])
         baked = tracer.collect(normals, directions, hits, sent)
         irradiance = lamps + np.maximum(np.einsum("nci,ni->nc", baked.light, normals), 0)
-    parts = []
+    of_bodies = []
     for k, body in enumerate(bodies):
         piece = slice(start[k], start[k + 1])
         own = Baked(baked.light[piece], baked.openness[piece], baked.sky[piece])
         own = _borrowed(own, body)
-        parts.append(
+        of_bodies.append(
             Baked(
                 _smooth(own.light, body.faces, body.smooth),
                 _smooth(own.openness, body.faces, body.smooth),
                 _smooth(own.sky, body.faces, body.smooth),
             )
         )
-    return parts
+    return of_bodies

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from renderer.memory import parts
 from renderer.scene.lights import Light, PointLight
 
 MARGIN = 1e-3  # of a cosine: far above the rounding of a shader
@@ -46,8 +47,7 @@ class Corners:
 
     def _parts(self) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """Of some triangles which they are, and their corners and their normals (K, 3, 3)."""
-        for start in range(0, len(self.faces), AT_ONCE):
-            part = slice(start, min(start + AT_ONCE, len(self.faces)))
+        for part in parts(len(self.faces), AT_ONCE):
             faces = self.faces[part]
             yield part, self._positions[faces], self._normals[faces]
 

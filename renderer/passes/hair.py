@@ -7,12 +7,13 @@ the depth of the first strand, and the opacity summed to some distances behind i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
 from renderer import gl
 from renderer.gl import GL
+from renderer.memory import parts
 from renderer.passes import occlusion
 from renderer.passes.environment import Surroundings
 from renderer.passes.lamps import Lamps
@@ -41,7 +42,7 @@ class Hair:
         self.points = np.asarray(self.strands.points, np.float32)
         if not np.array_equal(pose, np.eye(4)):  # else they are the scene's own
             self.points = np.empty(self.points.shape, np.float32)
-            for part in bands(len(self.points)):
+            for part in parts(len(self.points), ROWS * COLUMNS):
                 self.points[part] = item.in_world(self.strands.points[part])
         self.size = float(np.linalg.norm(pose[:3, 0]))
         self.counts = np.diff(first)
@@ -63,7 +64,7 @@ class Hair:
         """
         form = {1: GL.GL_R32F, 4: GL.GL_RGBA32F}[channels]
         texture = gl.Texture(COLUMNS, self.rows, form)
-        for part in bands(self.rows * COLUMNS):
+        for part in parts(self.rows * COLUMNS, ROWS * COLUMNS):
             texels = np.zeros((part.stop - part.start, channels), np.float32)
             own = slice(part.start, min(part.stop, len(self.points)))
             first = 0
@@ -275,12 +276,6 @@ def _draw_and_free(chosen: np.ndarray) -> None:
     mesh.draw()
     gl.finish()
     mesh.delete()
-
-
-def bands(count: int) -> Iterator[slice]:
-    """`count` points, ROWS rows of them at a time."""
-    for start in range(0, count, ROWS * COLUMNS):
-        yield slice(start, min(start + ROWS * COLUMNS, count))
 
 
 def tangents(points: np.ndarray, first: np.ndarray, part: slice, of: np.ndarray) -> np.ndarray:

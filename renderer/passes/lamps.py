@@ -10,6 +10,7 @@ import numpy as np
 
 from renderer import gl
 from renderer.gl import GL
+from renderer.memory import parts
 from renderer.scene.graph import look_at
 from renderer.scene.lights import DistantLight, Light, PointLight, SpotLight
 
@@ -67,8 +68,8 @@ def extremes(clouds: Clouds, of: Callable[[np.ndarray], np.ndarray]) -> tuple:
 
 def _parts(clouds: Clouds) -> Iterator[np.ndarray]:
     for cloud in clouds:
-        for start in range(0, len(cloud), AT_ONCE):
-            yield np.asarray(cloud[start : start + AT_ONCE], float)
+        for part in parts(len(cloud), AT_ONCE):
+            yield np.asarray(cloud[part], float)
 
 
 def distant_layer(light: DistantLight, clouds: Clouds) -> Layer:

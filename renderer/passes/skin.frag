@@ -25,7 +25,7 @@ uniform float melanin; uniform float blood; uniform float flush; uniform float m
 uniform float eyelid_blood; uniform float eyelid_epidermis; uniform vec2 lip_blood; uniform float lip_melanin; uniform float lip_melanin_inner; uniform float lip_epidermis;
 uniform float lip_haze; uniform vec3 lip_haze_colour; uniform float lip_ragged;
 uniform float freckles; uniform float freckle_share; uniform float spots; uniform float spot_share; uniform vec2 spots_mm; uniform float red_spots; uniform float red_share; uniform float moles; uniform float mole_share; uniform float vessels; uniform float veins;
-uniform float beard_tint; uniform float scalp_tint; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 shaven_left; uniform vec3 inside_left;
+uniform float beard_tint; uniform float scalp_tint; uniform float scalp_from; uniform vec3 scalp_left; uniform vec3 rooted_left; uniform vec3 shaven_left; uniform vec3 inside_left;
 uniform float pore_darkness; uniform vec2 micro_mm; uniform vec3 bumps_mm;
 uniform float f0_oily; uniform float roughness_lips; uniform float lobe_share_oily; uniform float oil_patches;
 uniform float pore_depth; uniform float furrow_depth; uniform float bump_height; uniform float wrinkle_depth; uniform float lip_folds;
@@ -295,7 +295,7 @@ vec3 colour(vec3 p, float pixel_mm, float pore, float mole, Waves waves, bool ma
     h = mix(h, vermilion, lips);
     thickness = mix(thickness, lip_epidermis, lips);
     // hair below the surface: scalp and shaven beard, dots that merge with distance
-    hair = layer_hair * smoothstep(0.45, 1.0, hair);  // before the line hairs are too few to tint the skin
+    hair = layer_hair * smoothstep(scalp_from, 1.0, hair);  // before the line hairs are too few to tint the skin
     beard *= layer_hair;
     float rooted = hair * (0.75 + 0.25 * noise(q / 4.0)), shaven = beard * (1.0 - hair) * clamp(0.75 + 0.35 * patchy + 0.35 * waves.middle.x, 0.0, 1.2), dots = 0.05;
     if (max(rooted, shaven) > 0.02) {

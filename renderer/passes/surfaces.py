@@ -57,6 +57,7 @@ SKIN_UNIFORMS = (
     "blood",
     "flush",
     "mottling",
+    "scalp_from",
     "uneven",
     "eyelid_blood",
     "eyelid_epidermis",

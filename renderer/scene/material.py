@@ -261,6 +261,13 @@ class Skin(Material):
     )
     beard: float = parameter(1.0, low=0.0, high=1.3, source="tint of shaven skin, by eye")
     scalp: float = parameter(0.9, source="darkening under hair, by eye", **_SHARE)
+    scalp_from: float = parameter(
+        0.45,
+        unit="of the mask of hair, from which it tints skin",
+        low=0.0,
+        high=0.95,
+        source="by eye",
+    )
     pores: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.080 and 0.040 mm")
     pore_shade: float = parameter(0.48, source="how much darker a deep pore is, by eye", **_SHARE)
     furrows: float = parameter(1.0, low=0.0, high=5.0, source="depth, of 0.030 mm")
@@ -380,7 +387,7 @@ class Skin(Material):
         lips, inner = lip_places(column["lips"])
         dull = albedo @ LUMA[:, None] * np.array(self.lip_haze_colour)
         albedo = albedo + self.lip_haze * lips * (1 - 0.5 * inner) * (dull - albedo)
-        hair = _smoothstep(0.45, 1.0, column["hair"])
+        hair = _smoothstep(self.scalp_from, 1.0, column["hair"])
         rooted, shaven = 0.75 * hair, 0.75 * self.beard * column["beard"] * (1 - hair)
         albedo = albedo * (1 + self.scalp * hair * (np.array(SCALP) - 1))
         dots = 0.45 * DOTS_MEAN * np.maximum(rooted, 0.75 * shaven)

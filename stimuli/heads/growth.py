@@ -4,13 +4,13 @@ kept out of the head.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
+from renderer.memory import parts
 from stimuli.heads.skin import HEAD_AXIS_Z
 from stimuli.heads.smooth import smoothstep
 from stimuli.heads.styles import Style
@@ -23,12 +23,6 @@ LOOK_MM = (1.5, 3.0, 5.0, 8.0, 13.0)  # where it is looked up outwards of a poin
 COMB_MM = 8.0  # cells of the direction of the comb
 BLEND_MM = 14.0  # anchors' values are level so near to them
 STRANDS, POINTS = 4096, 65536  # reckoned with at once: 100,000 long strands are 72 MB an array
-
-
-def parts(count: int, at_once: int = STRANDS) -> Iterator[slice]:
-    """`count` strands or points, some at once."""
-    for start in range(0, count, at_once):
-        yield slice(start, min(start + at_once, count))
 
 
 class Grid:
@@ -223,7 +217,7 @@ def covered(curves: np.ndarray, width: np.ndarray, out: np.ndarray) -> np.ndarra
     low = flat.min(axis=0) - 8 * DENSITY_MM
     shape = np.ceil((flat.max(axis=0) + 8 * DENSITY_MM - low) / DENSITY_MM).astype(int) + 1
     piece, index = np.empty(len(curves)), np.empty(len(flat), int)
-    for part in parts(len(curves)):
+    for part in parts(len(curves), STRANDS):
         piece[part] = np.linalg.norm(np.diff(curves[part], axis=1), axis=2).mean(axis=1)
     weight = np.repeat(piece * width, curves.shape[1])
     for part in parts(len(flat), POINTS):

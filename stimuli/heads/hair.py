@@ -11,6 +11,7 @@ import trimesh
 from scipy.spatial import cKDTree
 from scipy.special import betaincinv
 
+from renderer.memory import parts
 from renderer.scene import MASKS, Strands
 from renderer.scene.shapes import points_on, triangle_areas
 from stimuli.heads import growth, lashes
@@ -258,7 +259,7 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
     led = growth.gather(led, p[tufts], first_of, drawn)
     share_of = style.gather_tufts * apiece[:, None, None] * (s**0.8)[None, :, None]
     loose = np.where(fly, 0.25, 1.0)[:, None, None]
-    for part in growth.parts(count):
+    for part in parts(count, growth.STRANDS):
         leader, some = own_tuft[part], curves[part]
         apart = (p[part] - p[tufts][leader])[:, None] * (1 - 0.7 * s)[None, :, None]
         some += loose[part] * share_of[part] * (led[leader] + apart - some)
@@ -266,7 +267,7 @@ def _styled(roots: Roots, skin, scalp: Scalp, eyes, rng, share: float, own: Hair
     curves, at = _out_of_the_head(curves, skin, 4)
     if length.max() > LONG_MM:  # what met the body has corners
         del at
-        for part in growth.parts(count):
+        for part in parts(count, growth.STRANDS):
             some = curves[part]
             for _ in range(3):
                 some[:, 2:-1] += 0.25 * (some[:, 1:-2] - 2 * some[:, 2:-1] + some[:, 3:])
@@ -333,7 +334,7 @@ def _waved(curves, style: Style, length, draw, rng, skin) -> np.ndarray:
     swing = size * (np.cos(phase) - np.cos(phase[:, :1]))
     coil = style.coil * size * (np.sin(phase) - np.sin(phase[:, :1]))
     wander, turn = rng.normal(size=(count, 1, 3)), rng.uniform(0, 2 * np.pi, (count, 1, 3))
-    for part in growth.parts(count):
+    for part in parts(count, growth.STRANDS):
         some = curves[part]
         along = np.gradient(some, axis=1)
         along /= np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-9)
