@@ -58,7 +58,10 @@ def _delete_renderbuffer(name: int) -> None:
 
 
 class Texture:
-    """A 2-D texture. Linear or nearest filter, clamped at the edges unless it repeats."""
+    """A 2-D texture. Linear or nearest filter, clamped at the edges unless it repeats.
+
+    mipmap: with levels of means; of what is drawn into it they are made by `reduce`.
+    """
 
     kind = GL.GL_TEXTURE_2D
 
@@ -84,7 +87,7 @@ class Texture:
         GL.glTexParameteri(self.kind, GL.GL_TEXTURE_MAG_FILTER, smooth)
         GL.glTexParameteri(self.kind, GL.GL_TEXTURE_WRAP_S, wrap)
         GL.glTexParameteri(self.kind, GL.GL_TEXTURE_WRAP_T, wrap)
-        if mipmap:
+        if mipmap and data is not None:
             self.reduce()
 
     def reduce(self) -> None:

@@ -3,8 +3,9 @@
 #include "shaders/screen.glsl"
 uniform sampler2D irradiance; uniform sampler2D depths;
 uniform sampler2D guarded;     // with its levels of means
+uniform vec2 origin;           // of these in the picture, pixels
 uniform sampler2D chosen;      // a texel a tile
-uniform sampler2D taps;        // two rows a rung: radius in mm, cosine, sine, side of the mean in mm; weights over the profile, least radius of depth in mm
+uniform sampler2D taps;        // two rows a rung: radius in mm, cosine, sine, binary logarithm of the side of the mean in mm; weights over the profile, least radius of depth in mm
 uniform float firsts[SETS];    // where each set begins
 uniform float on_ring[SETS];   // taps on each ring of it
 uniform vec3 shape;            // 1 / d per channel, 1/mm
@@ -30,8 +31,9 @@ vec3 profile(float r) { vec3 third = exp(-shape * r / 3.0); return shape * (thir
 
 // By how much a read between two levels spreads it, in squared pixels.
 float spread_of(float level) {
-    float low = floor(level), side = exp2(low);
-    return mix(low < 0.5 ? PIXEL_VARIANCE : TEXEL_VARIANCE * side * side, TEXEL_VARIANCE * 4.0 * side * side, level - low);
+    int low = int(level);
+    float area = intBitsToFloat((127 + 2 * low) << 23);  // 4^low, by its exponent
+    return mix(low < 1 ? PIXEL_VARIANCE : TEXEL_VARIANCE * area, TEXEL_VARIANCE * 4.0 * area, level - float(low));
 }
 
 // Which even part of the turn between two taps a pixel of a block takes.
@@ -46,7 +48,7 @@ void main() {
     bool skin = own.a >= 0.5;
     scattered = vec4(own.rgb, skin ? 1.0 : 0.0);
     count = vec4(skin ? 1.0 : 0.0, 0.0, 0.0, 1.0);
-    float depth = texelFetch(depths, at, 0).x, scale = pixels_per_mm / max(depth, 1e-3), pixel_mm = 1.0 / scale;
+    float depth = texelFetch(depths, at, 0).x, scale = pixels_per_mm / max(depth, 1e-3), pixel_mm = 1.0 / scale, log2_scale = log2(scale);
     vec2 slope = vec2(dFdx(depth), dFdy(depth)) * scale;
     if (!skin || filter_radius_mm * scale < 1.0) return;
     float narrower = max(abs(slope.x), abs(slope.y)) < STEEPEST ? -0.5 * log2(1.0 + dot(slope, slope)) : 0.0;
@@ -65,7 +67,7 @@ void main() {
         vec4 tap = texelFetch(taps, ivec2(k, row), 0);
         weights = texelFetch(taps, ivec2(k, row + 1), 0);
         vec2 towards = rotation * tap.yz, there;
-        float fitted = max(log2(tap.w * scale), 0.0), level = clamp(fitted + narrower, 0.0, levels);
+        float fitted = max(tap.w + log2_scale, 0.0), level = clamp(fitted + narrower, 0.0, levels);
         float squared = tap.x * tap.x, whole_spread = squared + spread_of(fitted) * pixel_mm * pixel_mm;
         vec4 mean = vec4(0.0);
         bool averaged = false;
@@ -73,7 +75,7 @@ void main() {
             // what another side than the fitted one spreads more or less by comes off the radius or on it
             float side = exp2(level);
             there = gl_FragCoord.xy + sqrt(max(whole_spread - spread_of(level) * pixel_mm * pixel_mm, 0.04 * squared)) * towards;
-            mean = textureLod(guarded, there / padded, level);
+            mean = textureLod(guarded, (there - origin) / padded, level);
             averaged = mean.a >= max(whole, 1.0 - LOST / side);
             level = max(level - SMALLER, 0.0);
         }

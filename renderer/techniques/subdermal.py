@@ -26,6 +26,7 @@ from renderer.optics import burley, fits, rings
 from renderer.optics.curve import Curve
 from renderer.parameters import parameter
 from renderer.techniques.base import Inputs
+from renderer.techniques.cover import Window
 from renderer.techniques.golubev import BurleyFilter
 from renderer.techniques.rotated import GOLDEN
 from renderer.techniques.screen import Canvas
@@ -174,8 +175,9 @@ class Subdermal(BurleyFilter):
 
     def taps(self, curve: Curve, rung: int, block: int) -> np.ndarray:
         """The taps of all sets (2 block^2, sum of COUNTS, 4), two rows for each pixel of a block:
-        radius, cosine and sine of the angle, side of the mean, mm; then each channel's weight over
-        Burley's profile there, and the least radius by which depth is judged, mm.
+        radius, mm, cosine and sine of the angle, logarithm (base 2) of the mean's side in mm; then
+        each channel's weight over Burley's profile there, and the least radius by which depth is
+        judged, mm.
         """
         d, pixel, factors = self.distances(curve), RUNG**rung, self.factors(block)
         sets = self.sets(curve, rung, block)
@@ -193,10 +195,10 @@ class Subdermal(BurleyFilter):
                     profile = (np.exp(-near / d) + np.exp(-near / d / 3)) / (d * near)
                     number = taps if k else 1
                     share = weights / number / np.maximum(profile, LEAST)
-                    side = max(self._texel(taps) * r, pixel) if k else 0.0
+                    side = max(self._texel(taps) * r, pixel)
                     for j in range(number):
                         turn = 2 * np.pi * (k * GOLDEN + j / number)
-                        place = (r, np.cos(turn), np.sin(turn), side)
+                        place = (r, np.cos(turn), np.sin(turn), np.log2(side))
                         rows.append((place, (*share, near)))
             table.append(np.array(rows).transpose(1, 0, 2))
         return np.concatenate(table)
@@ -204,8 +206,8 @@ class Subdermal(BurleyFilter):
     def passes(self, canvas: Canvas) -> None:
         inputs, d = canvas.inputs, self.distances(canvas.inputs.curve)
         block = self.block(inputs)
-        size = [-(-side // PAD) * PAD for side in (inputs.width, inputs.height)]
-        tiled = [side // TILE for side in size]
+        x, y, *size = _box(inputs)
+        tiled = [-(-side // TILE) for side in (inputs.width, inputs.height)]
         defines = {"TILE": TILE, "SETS": len(SETS), "LARGEST": LARGEST}
         floats = [GL.GL_RGBA32F]
         with (
@@ -213,11 +215,25 @@ class Subdermal(BurleyFilter):
             gl.Target(*tiled, floats * 2) as tiles,
             gl.Target(*tiled, floats) as chosen,
         ):
-            canvas.draw(guarded, "techniques/subdermal_guard.glsl", step_px=self.guard_px)
+            canvas.given["origin"] = np.array([x, y], float)
+            for target in (guarded, tiles):
+                target.bind(clear=(0.0, 0.0, 0.0, 0.0))
+            canvas.draw(
+                guarded,
+                "techniques/subdermal_guard.glsl",
+                windows=[(own[0] - x, own[1] - y, *own[2:]) for own in _windows(inputs, 1)],
+                step_px=self.guard_px,
+            )
             guarded.textures[0].reduce()
             canvas.given["guarded"] = guarded.textures[0]
             wide = np.eye(len(d))[int(np.argmax(d))]
-            canvas.draw(tiles, "techniques/subdermal_tiles.glsl", defines, widest=wide)
+            canvas.draw(
+                tiles,
+                "techniques/subdermal_tiles.glsl",
+                defines,
+                windows=_windows(inputs, TILE),
+                widest=wide,
+            )
             first, table = self._table(inputs, tiles.textures[1].read()[..., 0])
             try:
                 canvas.draw(
@@ -234,7 +250,7 @@ class Subdermal(BurleyFilter):
                     counts=np.array(COUNTS, float),
                     ladder=(first, np.log(RUNG)),
                 )
-                canvas.draw(
+                canvas.filter(
                     canvas.result,
                     "techniques/subdermal.glsl",
                     defines,
@@ -271,6 +287,28 @@ class Subdermal(BurleyFilter):
             assert (fitted.weights >= 0).all() and np.isfinite(fitted.radius_mm).all()
             assert fitted.radius_mm[0] == 0 and (np.diff(fitted.radius_mm) > 0).all()
             assert fitted.radius_mm[-1] < 2 * widest
+
+
+def _windows(inputs: Inputs, side: int) -> list[Window]:
+    """Where anything scatters, in squares of so many pixels, a divisor of cover.TILE."""
+    cover = inputs.cover
+    whole = (0, 0, inputs.width, inputs.height)
+    return [
+        (x // side, y // side, -(-width // side), -(-height // side))
+        for x, y, width, height in ([whole] if cover is None else cover.scattering(0.0))
+    ]
+
+
+def _box(inputs: Inputs) -> Window:
+    """What means are made of: whole ones about all that scatters, and within the picture an empty
+    one on each side, since a read beyond the edge finds the last.
+    """
+    windows = np.array(_windows(inputs, 1) or [(0, 0, 1, 1)])
+    low = np.maximum(windows[:, :2].min(axis=0) // PAD - 1, 0)
+    ends = -(-(windows[:, :2] + windows[:, 2:]).max(axis=0) // PAD) + 1
+    high = np.minimum(ends, -(-np.array([inputs.width, inputs.height]) // PAD))
+    x, y, width, height = (int(k) for k in PAD * np.concatenate([low, high - low]))
+    return x, y, width, height
 
 
 def part_of_block(pixel: int, block: int) -> int:

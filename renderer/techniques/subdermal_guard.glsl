@@ -3,10 +3,11 @@
 uniform sampler2D irradiance; uniform sampler2D depths;
 uniform float pixels_per_mm;
 uniform float step_px;  // pixel widths of depth that are a step
+uniform vec2 origin;    // of what is drawn, in the picture, pixels
 out vec4 guarded;
 
 void main() {
-    ivec2 at = ivec2(gl_FragCoord.xy), last = textureSize(irradiance, 0) - 1;
+    ivec2 at = ivec2(gl_FragCoord.xy) + ivec2(origin), last = textureSize(irradiance, 0) - 1;
     guarded = vec4(0.0);
     if (any(greaterThan(at, last))) return;  // beyond the picture, where the pyramid is padded
     vec4 own = texelFetch(irradiance, at, 0);

@@ -1,6 +1,7 @@
 // Of each tile of TILE x TILE pixels: the mean irradiance of its skin in the widest channel and the mean of its square, the share of skin, and
 // of skin that the guard keeps from being averaged; and the skin's mean depth.
 uniform sampler2D irradiance; uniform sampler2D depths; uniform sampler2D guarded;
+uniform vec2 origin;  // of guarded in the picture, pixels
 uniform vec3 widest;  // 1 for that channel
 layout(location = 0) out vec4 light;
 layout(location = 1) out vec4 depth;  // x, mm
@@ -15,7 +16,7 @@ void main() {
         vec4 own = texelFetch(irradiance, at, 0);
         if (own.a < 0.5) continue;
         float e = dot(own.rgb, widest);
-        light += vec4(e, e * e, 1.0, 1.0 - texelFetch(guarded, at, 0).a);
+        light += vec4(e, e * e, 1.0, 1.0 - texelFetch(guarded, at - ivec2(origin), 0).a);
         depth.x += texelFetch(depths, at, 0).x;
     }
     float skin = max(light.z, 1.0);

@@ -38,7 +38,7 @@ SCENE = {
     },
     "camera": {"framing": "ball", "height_mm": 60.0, "yaw_deg": 10.0},
 }
-NAMES = ("none", "golubev", "golubev_plus", "jimenez_separable", "jimenez_gaussian")
+NAMES = ("none", "golubev", "golubev_plus", "jimenez_separable", "jimenez_gaussian", "subdermal")
 
 
 def drawn():
