@@ -118,6 +118,12 @@ def _panel(axes, values: np.ndarray, title: str, norm=None) -> object:
     return shown
 
 
+def _legend(figure, axes: np.ndarray) -> None:
+    """Below all axes, where it covers nothing: they have the same lines."""
+    lines = axes[0, 0].get_legend_handles_labels()
+    figure.legend(*lines, loc="outside lower center", ncols=-(-len(lines[0]) // 2), fontsize=7)
+
+
 def _power(top: float):
     from matplotlib.colors import PowerNorm
 
@@ -255,7 +261,7 @@ def _returns(out, rows, options) -> Iterator[Path]:
         axis.set_yscale("log")
         axis.set_xlabel("samples a computed pixel")
         axis.set_ylabel(f"{measure.upper()} over skin")
-    axes[0, 0].legend(fontsize=7)
+    _legend(figure, axes)
     figure.suptitle(f"Golubev: what more samples bring ({_said(options)})", fontsize=9)
     yield from _saved(figure, out / "4.4-returns", mine)
 
@@ -294,7 +300,7 @@ def _front(out, rows, options) -> Iterator[Path]:
             axis.set_xlabel("samples a computed pixel")
             axis.set_ylabel(f"{measure.upper()} over skin")
             axis.set_title(framing, fontsize=8)
-    axes[0, 0].legend(fontsize=7)
+    _legend(figure, axes)
     figure.suptitle(
         f"Quality against samples, to {options.converged} ({_said(options)})", fontsize=9
     )
