@@ -12,7 +12,6 @@ uniform vec3 shape;            // 1 / d per channel, 1/mm
 uniform float pixels_per_mm;
 uniform float filter_radius_mm;
 uniform float levels;          // of the pyramid
-uniform int sizes;             // of means, each SMALLER levels below the last, that are tried before one pixel
 uniform float whole;           // the least share of a mean that the guard has to let in
 uniform float jitter;          // 1: a rotation a block at random, 0: the same for all pixels
 uniform float turn;            // of this frame, in turns
@@ -71,7 +70,7 @@ void main() {
         float squared = tap.x * tap.x, whole_spread = squared + spread_of(fitted) * pixel_mm * pixel_mm;
         vec4 mean = vec4(0.0);
         bool averaged = false;
-        for (int j = 0; j < sizes && !averaged; ++j) {
+        for (int j = 0; j < SIZES && !averaged; ++j) {
             // what another side than the fitted one spreads more or less by comes off the radius or on it
             float side = exp2(level);
             there = gl_FragCoord.xy + sqrt(max(whole_spread - spread_of(level) * pixel_mm * pixel_mm, 0.04 * squared)) * towards;

@@ -253,7 +253,7 @@ class Subdermal(BurleyFilter):
                 canvas.filter(
                     canvas.result,
                     "techniques/subdermal.glsl",
-                    defines,
+                    {**defines, "SIZES": self.sizes},
                     chosen=chosen.textures[0],
                     taps=table,
                     firsts=np.cumsum((0, *COUNTS))[:-1].astype(float),
@@ -262,7 +262,6 @@ class Subdermal(BurleyFilter):
                     filter_radius_mm=self.filter_radius_mm(inputs.curve),
                     levels=float(LEVELS if self.pyramid else 0),
                     whole=self.whole,
-                    sizes=self.sizes,
                     block=block,
                 )
             finally:
