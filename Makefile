@@ -94,7 +94,7 @@ gallery: setup
 	$(SUBDERMAL) build stimuli/studies/stone.toml --out build/stone
 	$(SUBDERMAL) strip build/stone -f lamp -f behind -f two_lamps -f environment --out build/stone.png
 	$(SUBDERMAL) illumination build/illumination --samples 128
-	$(SUBDERMAL) redraw docs/figures
+	$(SUBDERMAL) redraw docs/figures --photons 3000000
 	$(JPEG) build/spheres.png docs/scenes/spheres.jpg
 	$(JPEG) build/stone.png docs/scenes/stone.jpg
 	$(JPEG) build/illumination/gallery.png docs/illumination.jpg
