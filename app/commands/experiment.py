@@ -221,13 +221,14 @@ def _chapter(scene, patches, framings, parts, options: dict, out: Path) -> None:
     options = chapters.Options(**options)
     chapters.checked(options)
     listed = chapters.tasks(framings, parts or chapters.PARTS, options)
-    rows: list[dict] = []
+    found: dict[chapters.Task, list[dict]] = {}
     made = chapters.run(scene, patches, listed, options, MAPS, out)
     with tqdm(total=len(listed), unit="picture", disable=None) as bar:
         for done, task, own in made:
-            rows += own
+            found[task] = own
             bar.set_description(f"{task.part} {task.framing} {task.technique}")
             bar.update(done - bar.n)
+    rows = [row for task in listed for row in found[task]]  # whatever was kept of an ended run
     chapters.write_csv(rows, out / "samples.csv")
     files = list(figures.draw(out, listed, rows, options))
     s = options.supersample

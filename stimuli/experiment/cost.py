@@ -19,7 +19,7 @@ from renderer.optics.figures import pyplot, save
 from stimuli.compare import chosen, framed
 from stimuli.errors import InputError
 from stimuli.experiment.chapter import front, write_csv
-from stimuli.experiment.figures import MARKERS, OKABE
+from stimuli.experiment.figures import MARKERS, OKABE, plain
 from stimuli.scenes import camera, load_table, merge
 
 AXES = ("resolution", "covered", "samples", "triangles", "lights", "splats")
@@ -264,13 +264,15 @@ def draw_growth(rows: Sequence[dict], stem: Path) -> list[Path]:
     grown |= laws([r for r in rows if r["technique"] == SHARED], "cpu_s")
     across = min(3, len(axes))
     down = -(-len(axes) // across)
-    size = (3.6 * across, 3.0 * down)
+    size = (3.6 * across, 3.7 * down)
+    style = {name: k for k, name in enumerate(dict.fromkeys(row["technique"] for row in rows))}
     figure, panels = plt.subplots(down, across, figsize=size, squeeze=False)
     for panel in panels.flat[len(axes) :]:
         panel.set_visible(False)
     for panel, axis in zip(panels.flat, axes):
         names = [name for one, name in grown if one == axis]
-        for k, name in enumerate(names):
+        for name in names:
+            k = style[name]
             here = [r for r in rows if (r["axis"], r["technique"]) == (axis, name)]
             column = "cpu_s" if name == SHARED else own
             x, law = np.array([r["x"] for r in here]), grown[axis, name]
@@ -282,9 +284,10 @@ def draw_growth(rows: Sequence[dict], stem: Path) -> list[Path]:
             panel.plot(ends, law.a * ends**law.b, color=colour, linewidth=1, label=label)
         panel.set_xscale("log")
         panel.set_yscale("log")
+        plain(panel)
         panel.set_xlabel(ABOUT[axis])
         panel.set_ylabel("seconds")
-        panel.legend(fontsize=6.5)
+        panel.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.2))
     what = "timer queries" if own == "card_s" else "CPU time"
     figure.suptitle(f"Growth of cost: exponent of x (95 %), {what}", fontsize=9)
     files = [stem.with_name(f"{stem.name}.{kind}") for kind in ("svg", "png", "csv")]
@@ -299,14 +302,19 @@ def draw_quality(rows: Sequence[dict], cost: str, stem: Path) -> list[Path]:
 
     rows: framing, technique, `rmse` (mean of R, G, B) and the seconds of the column `cost`.
     """
+    from matplotlib.ticker import MaxNLocator
+
     plt = pyplot()
     best = front(rows, cost, "rmse")
     figure, axis = plt.subplots(figsize=(6.0, 4.0))
     for k, (row, on) in enumerate(zip(rows, best)):
-        axis.plot(
+        axis.errorbar(
             1000 * row[cost],
             row["rmse"],
-            MARKERS[k % len(MARKERS)],
+            row.get("error"),
+            fmt=MARKERS[k % len(MARKERS)],
+            ecolor="#bbbbbb",
+            elinewidth=0.8,
             color=OKABE[k // len(MARKERS) % len(OKABE)],
             markersize=7 if on else 5,
         )
@@ -321,9 +329,15 @@ def draw_quality(rows: Sequence[dict], cost: str, stem: Path) -> list[Path]:
     line = sorted((1000 * r[cost], r["rmse"]) for r, on in zip(rows, best) if on)
     axis.step(*zip(*line), where="post", color="#444444", linewidth=0.9)
     axis.set_xscale("log")
+    plain(axis)
+    axis.yaxis.set_major_locator(MaxNLocator(6))
     axis.set_xlabel("milliseconds of scattering")
-    axis.set_ylabel("RMSE of light to the reference, of the strongest lamp's irradiance")
-    axis.set_title("Quality per cost; bold: no other technique beats it in both", fontsize=9)
+    axis.set_ylabel("RMSE to the reference, of the strongest lamp")
+    axis.set_title(
+        "Quality per cost; bold: no other technique beats it in both;\nbars: standard error, of "
+        "walks that all of them share",
+        fontsize=9,
+    )
     files = [stem.with_name(f"{stem.name}.{kind}") for kind in ("svg", "png", "csv")]
     for file in files[:2]:
         save(figure, file)

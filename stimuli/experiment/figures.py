@@ -67,14 +67,21 @@ def _samples(count: int) -> str:
     return f"{count} sample{'s' if count > 1 else ''}"
 
 
-def _plain(axis) -> None:
-    """Logarithmic axes with few plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+def plain(axes) -> None:
+    """Logarithmic axes, of what is drawn by now, with few plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-    for one, subs in ((axis.xaxis, (1.0, 2.0, 5.0)), (axis.yaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))):
-        one.set_major_locator(LogLocator(subs=subs))
-        one.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    for one, fine in ((axes.xaxis, (1.0, 2.0, 5.0)), (axes.yaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))):
+        low, high = one.get_view_interval()
+        subs = (1.0, 3.0) if high > 60 * low else (1.0, 2.0, 5.0) if high > 15 * low else fine
+        few = one is axes.xaxis and high < 4 * low
+        one.set_major_locator(MaxNLocator(4) if few else LogLocator(subs=subs))
+        one.set_major_formatter(FuncFormatter(_plainly))
         one.set_minor_formatter(NullFormatter())
+
+
+def _plainly(value: float, _=None) -> str:
+    return f"{value:,.0f}" if value >= 1000 else f"{value:g}"
 
 
 def _value(rows, task: Task, against: str, column: str, region: str = "mask") -> float:
@@ -296,7 +303,7 @@ def _front(out, rows, options) -> Iterator[Path]:
             axis.step(*zip(*best), where="post", color="#444444", linewidth=0.9, label="front")
             axis.set_xscale("log")
             axis.set_yscale("log")
-            _plain(axis)
+            plain(axis)
             axis.set_xlabel("samples a computed pixel")
             axis.set_ylabel(f"{measure.upper()} over skin")
             axis.set_title(framing, fontsize=8)
