@@ -131,13 +131,15 @@ def compare(
     distances: Distances,
     against: Mapping[str, Any] | None = None,
     executor: Executor | None = None,
+    advance: Callable[[str], None] = lambda _: None,
 ) -> list[Shot]:
     """Every technique at every framing ("": the scene's own camera), beside the reference, or
-    beside the one technique that is named in `against`. executor: walks for the reference.
+    beside the one technique that is named in `against`. executor: walks for the reference;
+    advance: called after each technique with its framing and name.
     """
     table = merge(load_table(scene), patch)
     return [
-        _shot(name, frame, lights, techniques, options, distances, against)
+        _shot(name, frame, lights, techniques, options, distances, against, advance)
         for name, frame, lights in framed(scene, table, framings, options, executor)
     ]
 
@@ -190,7 +192,7 @@ def _at(table: dict, framing: str) -> dict:
 
 
 def _shot(
-    framing, frame, lights, techniques, options: Options, distances: Distances, against
+    framing, frame, lights, techniques, options: Options, distances: Distances, against, advance
 ) -> Shot:
     from renderer import make
     from renderer.reference.estimate import rms_error
@@ -239,6 +241,7 @@ def _shot(
             measures = {k: tuple(float(m[mask].mean()) for m in both) for k, both in maps.items()}
             numbers = [tuple(map(float, part)) for part in (rmse, error, ratio)]
             rows.append(Row(framing, name, region, int(mask.sum()), *numbers, measures))
+        advance(f"{framing} {name}")
     noise = np.sqrt(((halves[0] - halves[1])[scatters] ** 2).mean(axis=0)) / 2 / unit
     return Shot(framing, label, images, half, tuple(rows), noise, residual, layered)
 

@@ -150,6 +150,8 @@ def command(
     against one of half of the walks and one of all, so that the noise's share is seen. What takes
     long is kept, and goes on where it was interrupted.
     """
+    from tqdm import tqdm
+
     from analysis.objective import MAPS
     from stimuli.compare import Options, chosen, compare, sheet, write_table
     from stimuli.errors import InputError
@@ -162,10 +164,18 @@ def command(
     if other and len(other) != 1:
         raise InputError(f"--against is {against!r}; expected one technique")
     settings = Options(crop=crop, **options)
-    with working.crew(workers, cluster) as crew:
+    made, framings = chosen(techniques), framings or [""]
+    with (
+        working.crew(workers, cluster) as crew,
+        tqdm(total=len(framings) * len({*made} - {*(other or ())}), disable=None) as bar,
+    ):
+
+        def advance(what: str) -> None:
+            bar.set_description(what)
+            bar.update()
+
         shots = compare(
-            *(scene, patches, framings or [""], chosen(techniques), settings, MAPS, other),
-            crew.executor,
+            *(scene, patches, framings, made, settings, MAPS, other), crew.executor, advance
         )
     for shot in shots:
         if other:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from PIL import Image
+from tqdm import tqdm
 
 import renderer
 from renderer.errors import InputError as RenderError
@@ -123,15 +124,26 @@ def test_a_colour_without_light_is_no_error(run, tmp_path):
     assert "nan" not in out
 
 
-def test_six_gaussians_over_the_atlas_and_over_the_screen_are_one_picture(run, tmp_path):
+def test_six_gaussians_over_the_atlas_and_over_the_screen_are_one_picture(
+    run, tmp_path, monkeypatch
+):
     """On a flat slab under the shadows of bars: DSSIM below 0.002 (0.0007 at 480x270,
     docs/techniques.md), a hundredth of what leaving scattering out makes."""
     techniques = ("-t", "none", "-t", "deon_luebke:texturing=0:size=1024")
     where = (DOCS / "scenes" / "bars.toml", "--size", "240x135", "--table", "table.csv")
+    bars = []
+
+    class Bar(tqdm):
+        def __init__(self, *given, **options):
+            super().__init__(*given, **options | {"disable": False})
+            bars.append(self)
+
+    monkeypatch.setattr("tqdm.tqdm", Bar)
     code, out, err = run(
         "compare", *where, *techniques, "--against", "jimenez_gaussian:texturing=0"
     )
     assert code == 0, err
+    assert [(bar.n, bar.total) for bar in bars] == [(2, 2)]
     assert "against jimenez_gaussian texturing=0" in out and "standard error" not in out
     rows = {
         row["technique"]: row
